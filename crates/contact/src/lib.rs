@@ -1,1 +1,7 @@
-//! placeholder
+//! The discrete problem of two membranes in unilateral contact, and its solvers.
+
+pub mod problem;
+pub mod solution;
+
+pub use problem::{DiscreteProblem, Tensions};
+pub use solution::{Reduction, Solution, SolveInfo, Status, kkt_residual};

@@ -1,0 +1,100 @@
+//! What a solver returns, and the one number that judges it.
+
+use crate::problem::DiscreteProblem;
+
+/// Which model the solver took: the smallest that the scene allows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Reduction {
+    /// The unconstrained membranes do not touch: two linear problems.
+    NoContact,
+    /// The membranes touch everywhere: one linear problem with A_1 + A_2 (2.9).
+    FullContact,
+    /// Constant tensions: one linear problem for mu_1 u1 + mu_2 u2 and one scalar obstacle problem for u1 - u2.
+    ConstantTensions,
+    /// Variable tensions in a constant ratio: the same with A_1 in place of mu_1 K.
+    ConstantRatio,
+    /// The two-field problem.
+    TwoField,
+}
+
+/// How a solver ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Status {
+    /// The tolerance holds on the iterate that is returned.
+    Converged,
+    /// No further progress; the tolerance does not hold.
+    Stagnated,
+    /// The limit on iterations came first.
+    Limit,
+}
+
+/// Always returned beside a solution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolveInfo {
+    /// Name of the solver as in the scene file, for example `active-set`; with `+monotone` where the fallback finished.
+    pub solver: &'static str,
+    /// The model that was solved.
+    pub reduction: Reduction,
+    /// How it ended.
+    pub status: Status,
+    /// Linear solves of the inequality (active set) or interior-point iterations (clarabel); 1 for a problem without inequality.
+    pub iterations: usize,
+    /// Size of the algebraic problem: twice the interior vertices, once for full contact.
+    pub unknowns: usize,
+    /// Relative KKT residual of the iterate that is returned.
+    pub kkt_residual: f64,
+}
+
+/// Nodal solution of a [`DiscreteProblem`], one entry a vertex, boundary included.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Displacements u1, u2.
+    pub displacement: [Vec<f64>; 2],
+    /// Action forces z_j = <lambda_h, phi_j> >= 0; 0 on the boundary.
+    pub force: Vec<f64>,
+    /// Riesz representative sigma_h of the action: K sigma = z (4.1), (5.4); 0 on the boundary.
+    pub sigma: Vec<f64>,
+    /// The contact set: interior vertices of the active set.
+    pub contact: Vec<bool>,
+    /// How it was found.
+    pub info: SolveInfo,
+}
+
+impl Solution {
+    /// The gap u1 - u2 at a vertex.
+    #[inline]
+    pub fn gap(&self, vertex: usize) -> f64 {
+        self.displacement[0][vertex] - self.displacement[1][vertex]
+    }
+}
+
+/// The relative KKT residual of an iterate: the largest, over interior vertices j, of `|F_ij +- z_j - (A_i u_i)_j| / (d_ij U)` and
+/// `|min(w_j, z_j/d_j)| / U`, U the largest displacement (1 if all are zero).
+pub fn kkt_residual(problem: &DiscreteProblem, displacement: &[Vec<f64>; 2], force: &[f64]) -> f64 {
+    let largest = displacement
+        .iter()
+        .flatten()
+        .fold(0.0f64, |m, u| m.max(u.abs()));
+    let unit = if largest == 0.0 { 1.0 } else { largest };
+    let mut worst = 0.0f64;
+    for j in (0..problem.order()).filter(|&j| !problem.boundary[j]) {
+        for (i, sign) in [(0, 1.0), (1, -1.0)] {
+            let rest = problem.loads[i].nodal[j] + sign * force[j]
+                - problem.stiffness[i].row_dot(j, &displacement[i]);
+            worst = worst.max(rest.abs() / problem.diagonal(i, j) / unit);
+        }
+        let gap = displacement[0][j] - displacement[1][j];
+        worst = worst.max(gap.min(force[j] / problem.harmonic_diagonal(j)).abs() / unit);
+    }
+    // A NaN anywhere must not pass for a good residual.
+    if displacement
+        .iter()
+        .flatten()
+        .chain(force)
+        .all(|v| v.is_finite())
+    {
+        worst
+    } else {
+        f64::INFINITY
+    }
+}
