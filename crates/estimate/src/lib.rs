@@ -1,1 +1,5 @@
-//! placeholder
+//! Error indicators and true errors of a discrete solution.
+
+pub mod exact;
+
+pub use exact::{Exact, Gradient};
