@@ -1,0 +1,111 @@
+//! Loads and means of smooth, jumping and singular data.
+
+use fem_core::integrate::{loads, means};
+use fem_core::{Children, Constant, Field, FieldError, Mesh, Samples};
+
+fn square(refinements: usize) -> Mesh {
+    let points = vec![[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let mut mesh = Mesh::new(points, &[[0, 1, 2], [0, 2, 3]], &[], None).expect("a square");
+    for _ in 0..refinements {
+        mesh.refine_uniformly(Children::Four).expect("refines");
+    }
+    mesh
+}
+
+fn total(values: &[f64]) -> f64 {
+    values.iter().sum()
+}
+
+#[test]
+fn polynomials_are_integrated_exactly() {
+    let mesh = square(2);
+    let f = |x: f64, y: f64| 3.0 * x.powi(4) - x * y * y + 2.0;
+    let l = loads(&mesh, &f).expect("finite");
+    // Against the affine function 1 + x, whose nodal values are known: degree five in all.
+    let paired: f64 = l.nodal.iter().zip(mesh.points()).map(|(m, p)| m * (1.0 + p[0])).sum();
+    let exact = 3.0 * 4.0 / 5.0 + 2.0 * 4.0 - 4.0 / 9.0;
+    assert!((paired - exact).abs() < 1e-14, "{paired} {exact}");
+    let squares: f64 = l.deviation_squared.iter().sum::<f64>();
+    assert!(squares > 0.1);
+    let c = loads(&mesh, &Constant(0.3)).expect("finite");
+    assert!((total(&c.nodal) - 1.2).abs() < 1e-15);
+    assert!(c.deviation_squared.iter().all(|&d| d == 0.0));
+    let c = loads(&mesh, &|_: f64, _: f64| 0.3).expect("finite");
+    assert!(c.deviation_squared.iter().all(|&d| d == 0.0) && c.mean.iter().all(|&m| m == 0.3));
+}
+
+#[test]
+fn a_jump_inside_elements_is_followed() {
+    let step = |x: f64, y: f64| f64::from(x * x + y * y < 0.5);
+    let exact = 0.5 * std::f64::consts::PI;
+    // The rule resolves the circle to 1e-4 of the whole on every mesh, coarse or fine.
+    for level in 1..6 {
+        let mesh = square(level);
+        let l = loads(&mesh, &step).expect("finite");
+        assert!((total(&l.nodal) - exact).abs() < 3e-4, "{level}: {}", total(&l.nodal) - exact);
+        // ||f||^2 = sum of means squared and deviations: the same number, since f is 0 or 1.
+        let norm: f64 = mesh
+            .triangle_ids()
+            .map(|t| mesh.shape(t).area * l.mean[t.index()].powi(2) + l.deviation_squared[t.index()])
+            .sum();
+        assert!((norm - exact).abs() < 3e-4, "{level}: {}", norm - exact);
+    }
+}
+
+#[test]
+fn a_singular_corner_is_graded() {
+    let f = |x: f64, y: f64| (x * x + y * y).powf(-1.0 / 6.0);
+    let mesh = square(2);
+    let l = loads(&mesh, &f).expect("finite inside elements");
+    // Integral of r^(-1/3) over the square: 8 times that over the triangle 0 < y < x < 1, in polar coordinates
+    // (3/5) int_0^(pi/4) cos^(-5/3), by Simpson's rule.
+    let n = 2000;
+    let h = std::f64::consts::FRAC_PI_4 / n as f64;
+    let g = |i: usize| (i as f64 * h).cos().powf(-5.0 / 3.0);
+    let simpson: f64 = (0..n / 2).map(|i| g(2 * i) + 4.0 * g(2 * i + 1) + g(2 * i + 2)).sum::<f64>() * h / 3.0;
+    let exact = 8.0 * 0.6 * simpson;
+    assert!((total(&l.nodal) / exact - 1.0).abs() < 1e-5, "{} {exact}", total(&l.nodal));
+}
+
+#[test]
+fn means_of_smooth_tensions_have_ten_digits() {
+    let mesh = square(2);
+    let mu = |x: f64, y: f64| (0.7 * x - y).exp();
+    let m = means(&mesh, &mu).expect("finite");
+    let whole: f64 = mesh.triangle_ids().map(|t| mesh.shape(t).area * m[t.index()]).sum();
+    let exact = (2.0 * 0.7f64.sinh() / 0.7) * 2.0 * 1f64.sinh();
+    assert!((whole / exact - 1.0).abs() < 1e-11, "{}", whole / exact - 1.0);
+    let aligned = means(&mesh, &|x: f64, _: f64| if x > 0.0 { 1e4 } else { 1.0 }).expect("finite");
+    assert!(aligned.iter().all(|&m| m == 1.0 || m == 1e4));
+    let cut = means(&mesh, &|x: f64, _: f64| if x > 1.0 / 3.0 { 1e4 } else { 1.0 }).expect("finite");
+    let whole: f64 = mesh.triangle_ids().map(|t| mesh.shape(t).area * cut[t.index()]).sum();
+    let exact = 2.0 * (4.0 / 3.0 + 1e4 * 2.0 / 3.0);
+    assert!((whole / exact - 1.0).abs() < 2e-3, "{}", whole / exact - 1.0);
+}
+
+/// Counts its samples.
+struct Counting(std::sync::atomic::AtomicUsize);
+
+impl Field for Counting {
+    fn sample(&self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
+        self.0.fetch_add(at.len(), std::sync::atomic::Ordering::Relaxed);
+        for (k, v) in out.iter_mut().enumerate() {
+            *v = (at.x[k] + 2.0 * at.y[k]).sin();
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn smooth_data_on_a_fine_mesh_cost_seven_points() {
+    let mesh = square(7);
+    let f = Counting(0.into());
+    loads(&mesh, &f).expect("finite");
+    assert_eq!(f.0.into_inner(), 7 * mesh.triangle_count());
+}
+
+#[test]
+fn a_value_that_is_not_finite_says_where() {
+    let error = loads(&square(3), &|x: f64, _: f64| 1.0 / (x - 0.5).max(0.0)).expect_err("infinite left of 0.5");
+    assert!(error.value.is_infinite() && error.x <= 0.5, "{error}");
+}
