@@ -290,7 +290,7 @@ const LOAD_CONTROL: Control = Control {
     tolerance: 1e-7,
     local: false,
     depth: 14,
-    largest_share: 1.0 / 4096.0,
+    largest_share: 1.0 / 16384.0,
 };
 
 /// Element means of tensions are wanted to ten digits where the tension is smooth.
