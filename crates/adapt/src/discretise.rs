@@ -1,0 +1,85 @@
+//! From the data of a problem to the discrete problem on one mesh.
+
+use std::sync::Arc;
+
+use contact::DiscreteProblem;
+use fem_core::integrate::{loads, means};
+use fem_core::{Field, FieldError, Mesh, Samples};
+
+use crate::problem::Problem;
+
+/// Data that were found wrong on a level.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DataError {
+    /// A value that is not finite.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// A tension that is not positive.
+    #[error("the tension of the {membrane} membrane has mean {mean:e} over the triangle around ({x}, {y})")]
+    Tension {
+        /// `upper` or `lower`.
+        membrane: &'static str,
+        /// The mean, scaled.
+        mean: f64,
+        /// Barycentre, in the user's units.
+        x: f64,
+        /// Barycentre, in the user's units.
+        y: f64,
+    },
+    /// The lower membrane is fixed above the upper one.
+    #[error("on the boundary at ({x}, {y}) the lower membrane is {excess:e} above the upper one")]
+    Heights {
+        /// First coordinate, in the user's units.
+        x: f64,
+        /// Second coordinate, in the user's units.
+        y: f64,
+        /// g2 - g1, in the user's units.
+        excess: f64,
+    },
+}
+
+/// Integrates the data and assembles the matrices on a mesh.
+///
+/// # Errors
+/// [`DataError`] where data are not finite, a tension is not positive, or g1 < g2.
+pub fn discretise(problem: &Problem, mesh: &Mesh) -> Result<DiscreteProblem, DataError> {
+    let physical = |v: f64| fem_core::scale::times_power_of_two(v, problem.scale.length);
+    let tension = [means(mesh, &*problem.tension[0])?, means(mesh, &*problem.tension[1])?];
+    for (mean, membrane) in tension.iter().zip(["upper", "lower"]) {
+        if let Some(t) = mean.iter().position(|m| m.is_nan() || *m <= 0.0) {
+            let c = mesh.corners(fem_core::TriangleId(t as u32));
+            let centre = [0, 1].map(|k| physical((c[0][k] + c[1][k] + c[2][k]) / 3.0));
+            return Err(DataError::Tension { membrane, mean: mean[t], x: centre[0], y: centre[1] });
+        }
+    }
+    let heights = heights(mesh, &problem.height)?;
+    if let Some(j) = (0..mesh.vertex_count()).find(|&j| heights[0][j] < heights[1][j]) {
+        let [x, y] = mesh.points()[j].map(physical);
+        let excess = heights[1][j] - heights[0][j];
+        let excess = fem_core::scale::times_power_of_two(excess, problem.scale.displacement());
+        return Err(DataError::Heights { x, y, excess });
+    }
+    let loads = [loads(mesh, &*problem.load[0])?, loads(mesh, &*problem.load[1])?];
+    Ok(DiscreteProblem::new(mesh, tension, loads, heights))
+}
+
+/// Heights at the boundary vertices, 0 inside; `region` there is that of a triangle with an edge on the boundary.
+fn heights(mesh: &Mesh, height: &[Arc<dyn Field>; 2]) -> Result<[Vec<f64>; 2], FieldError> {
+    let mut region = vec![0.0; mesh.vertex_count()];
+    for (t, face) in mesh.boundary_edges() {
+        for v in mesh.face(t, face) {
+            region[v.index()] = f64::from(mesh.region()[t.index()]);
+        }
+    }
+    let boundary: Vec<usize> = (0..mesh.vertex_count()).filter(|&j| mesh.boundary()[j]).collect();
+    let x: Vec<f64> = boundary.iter().map(|&j| mesh.points()[j][0]).collect();
+    let y: Vec<f64> = boundary.iter().map(|&j| mesh.points()[j][1]).collect();
+    let region: Vec<f64> = boundary.iter().map(|&j| region[j]).collect();
+    let mut values = vec![0.0; boundary.len()];
+    let mut result = [vec![0.0; mesh.vertex_count()], vec![0.0; mesh.vertex_count()]];
+    for (field, result) in height.iter().zip(&mut result) {
+        field.sample(Samples { x: &x, y: &y, region: &region }, &mut values)?;
+        boundary.iter().zip(&values).for_each(|(&j, &v)| result[j] = v);
+    }
+    Ok(result)
+}

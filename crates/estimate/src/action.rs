@@ -1,0 +1,120 @@
+//! The action as a function: l_j = z_j / |D_j| at interior vertices, carried on to the boundary.
+//!
+//! The discrete problem has no multiplier at boundary vertices, but the contact set may reach the boundary, and the dual cells there need a value.
+//! Zero would cost a strip of width h. The rule: 0 where the gap is positive; else the mean over all interior neighbours; a
+//! vertex without interior neighbours (a corner) takes the mean over the neighbours that have a value already, round by round.
+
+use contact::{DiscreteProblem, Solution};
+use fem_core::Mesh;
+
+/// The nodal action l_j on all vertices, boundary included; a pressure (force per area).
+///
+/// This is the action to show; minus the Laplacian of sigma_h is a measure on edges with negative parts.
+pub fn nodal_action(mesh: &Mesh, problem: &DiscreteProblem, solution: &Solution) -> Vec<f64> {
+    debug_assert_eq!(mesh.vertex_count(), problem.order());
+    let mut action: Vec<f64> = solution
+        .force
+        .iter()
+        .zip(&problem.dual_area)
+        .map(|(z, area)| z / area)
+        .collect();
+    extend_to_boundary(problem, solution, &mut action);
+    action
+}
+
+/// Overwrites the entries of boundary vertices by the rule of the [module](self).
+///
+/// `values` has one entry a vertex. Vertices that no interior vertex can be reached from along boundary vertices get 0.
+pub fn extend_to_boundary(problem: &DiscreteProblem, solution: &Solution, values: &mut [f64]) {
+    let neighbours = |j: usize| problem.pattern.columns(j).iter().map(|&k| k as usize);
+    let mean = |j: usize, done: &[bool], values: &[f64]| {
+        let (mut sum, mut count) = (0.0, 0usize);
+        for k in neighbours(j).filter(|&k| done[k]) {
+            sum += values[k];
+            count += 1;
+        }
+        (count > 0).then(|| sum / count as f64)
+    };
+    let interior: Vec<bool> = problem.boundary.iter().map(|&b| !b).collect();
+    let mut done = interior.clone();
+    let mut front = Vec::new();
+    for j in (0..values.len()).filter(|&j| problem.boundary[j]) {
+        values[j] = 0.0;
+        let value = if solution.gap(j) > 0.0 {
+            Some(0.0)
+        } else {
+            mean(j, &interior, values)
+        };
+        if let Some(value) = value {
+            values[j] = value;
+            done[j] = true;
+            front.push(j);
+        }
+    }
+    // Every vertex is reached once; a round looks only at rounds before it, so the order within a round does not matter.
+    while !front.is_empty() {
+        let mut next: Vec<usize> = front
+            .iter()
+            .flat_map(|&j| neighbours(j))
+            .filter(|&k| !done[k])
+            .collect();
+        next.sort_unstable();
+        next.dedup();
+        let reached: Vec<Option<f64>> = next.iter().map(|&j| mean(j, &done, values)).collect();
+        for (&j, value) in next.iter().zip(reached) {
+            values[j] = value.unwrap_or(0.0);
+            done[j] = true;
+        }
+        front = next;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{close, four_triangles, problem, solution, two_triangles};
+
+    #[test]
+    fn boundary_takes_the_mean_of_interior_neighbours_unless_there_is_a_gap() {
+        let mesh = four_triangles();
+        let problem = problem(&mesh, [vec![1.0; 4], vec![1.0; 4]], [0.0, 0.0]);
+        let upper = vec![0.0, 0.5, 0.0, 0.0, 0.0];
+        let force = vec![0.0, 0.0, 0.0, 0.0, 2.0];
+        let solution = solution([upper, vec![0.0; 5]], force, vec![0.0; 5]);
+        // The dual cell of the centre has an area of 4/3.
+        let action = nodal_action(&mesh, &problem, &solution);
+        for j in [0, 2, 3, 4] {
+            close(action[j], 1.5, 1e-15);
+        }
+        assert_eq!(action[1], 0.0);
+    }
+
+    #[test]
+    fn a_corner_takes_the_mean_of_vertices_that_are_done() {
+        // The four triangles and a fifth that hangs on the right side, its tip out of sight of the centre.
+        let points = vec![
+            [-1.0, -1.0],
+            [1.0, -1.0],
+            [1.0, 1.0],
+            [-1.0, 1.0],
+            [0.0, 0.0],
+            [2.0, 0.0],
+        ];
+        let triangles = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 5, 2]];
+        let mesh = Mesh::new(points, &triangles, &[], None).unwrap();
+        let problem = problem(&mesh, [vec![1.0; 5], vec![1.0; 5]], [0.0, 0.0]);
+        let mut values = vec![7.0, 7.0, 7.0, 7.0, 1.5, 7.0];
+        let upper = vec![0.0, 0.5, 0.0, 0.0, 0.0, 0.0];
+        let solution = solution([upper, vec![0.0; 6]], vec![0.0; 6], vec![0.0; 6]);
+        extend_to_boundary(&problem, &solution, &mut values);
+        assert_eq!(values, [1.5, 0.0, 1.5, 1.5, 1.5, 0.75]);
+    }
+
+    #[test]
+    fn without_interior_vertices_there_is_no_action() {
+        let mesh = two_triangles();
+        let problem = problem(&mesh, [vec![1.0; 2], vec![1.0; 2]], [0.0, 0.0]);
+        let solution = solution([vec![0.0; 4], vec![0.0; 4]], vec![0.0; 4], vec![0.0; 4]);
+        assert_eq!(nodal_action(&mesh, &problem, &solution), [0.0; 4]);
+    }
+}

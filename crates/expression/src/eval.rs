@@ -1,0 +1,347 @@
+//! Runs a compiled formula over blocks of points, one instruction at a time for the whole block.
+
+use crate::compile::{Op, Operand, Program};
+use crate::function::{Binary, Unary};
+use std::cell::RefCell;
+
+/// Points in a block: few enough that the registers stay in the first cache, and that a byte numbers a point.
+const BLOCK: usize = 256;
+
+/// Registers that a thread keeps from one call to the next.
+const KEPT_REGISTERS: usize = 512;
+
+/// Working memory, kept by each thread.
+#[derive(Default)]
+struct Scratch {
+    registers: Vec<Vec<f64>>,
+    /// The points of the open branches, as a stack of lists.
+    points: Vec<u8>,
+    splits: Vec<Split>,
+}
+
+/// The points an instruction works on.
+#[derive(Clone, Copy)]
+enum Active {
+    /// The whole block.
+    All,
+    /// A range of `Scratch::points`.
+    List(usize, usize),
+}
+
+/// A branch begun and not yet joined.
+struct Split {
+    before: Active,
+    other: Active,
+    /// Length of `Scratch::points` before the split.
+    mark: usize,
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = const {
+        RefCell::new(Scratch { registers: Vec::new(), points: Vec::new(), splits: Vec::new() })
+    };
+}
+
+/// Evaluates at all points; the lengths are equal, but that of `region` may be zero.
+pub(crate) fn evaluate(program: &Program, x: &[f64], y: &[f64], region: &[f64], out: &mut [f64]) {
+    if let Operand::Number(value) = program.result {
+        out.fill(value);
+        return;
+    }
+    SCRATCH.with_borrow_mut(|scratch| {
+        while scratch.registers.len() < program.registers {
+            scratch.registers.push(vec![0.0; BLOCK]);
+        }
+        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
+            let range = block * BLOCK..block * BLOCK + out.len();
+            let inputs = Inputs {
+                x: &x[range.clone()],
+                y: &y[range.clone()],
+                region: if region.is_empty() {
+                    None
+                } else {
+                    Some(&region[range])
+                },
+            };
+            run(program, inputs, scratch, out);
+        }
+        scratch.registers.truncate(KEPT_REGISTERS);
+    });
+}
+
+#[derive(Clone, Copy)]
+struct Inputs<'a> {
+    x: &'a [f64],
+    y: &'a [f64],
+    region: Option<&'a [f64]>,
+}
+
+impl<'a> Inputs<'a> {
+    fn fetch(self, operand: Operand, registers: &'a [Vec<f64>]) -> Source<'a> {
+        match operand {
+            Operand::Register(register) => {
+                Source::Each(&registers[register as usize][..self.x.len()])
+            }
+            Operand::X => Source::Each(self.x),
+            Operand::Y => Source::Each(self.y),
+            Operand::Region => self.region.map_or(Source::Same(0.0), Source::Each),
+            Operand::Number(value) => Source::Same(value),
+        }
+    }
+}
+
+/// The values of an operand over the block.
+#[derive(Clone, Copy)]
+enum Source<'a> {
+    Each(&'a [f64]),
+    Same(f64),
+}
+
+impl Source<'_> {
+    #[inline(always)]
+    fn at(self, point: usize) -> f64 {
+        match self {
+            Self::Each(values) => values[point],
+            Self::Same(value) => value,
+        }
+    }
+}
+
+fn run(program: &Program, inputs: Inputs, scratch: &mut Scratch, out: &mut [f64]) {
+    let length = out.len();
+    let Scratch {
+        registers,
+        points,
+        splits,
+    } = scratch;
+    points.clear();
+    splits.clear();
+    let mut active = Active::All;
+    let mut next = 0;
+    while let Some(op) = program.ops.get(next) {
+        next += 1;
+        let target = match *op {
+            Op::Split(condition, middle) => {
+                let condition = inputs.fetch(condition, registers);
+                let mark = points.len();
+                let (then, other) = divide(condition, length, active, points);
+                splits.push(Split {
+                    before: active,
+                    other,
+                    mark,
+                });
+                active = then;
+                if is_empty(active) {
+                    next = middle as usize;
+                }
+                continue;
+            }
+            Op::Else(end) => {
+                if let Some(split) = splits.last() {
+                    active = split.other;
+                }
+                if is_empty(active) {
+                    next = end as usize;
+                }
+                continue;
+            }
+            Op::Join => {
+                if let Some(split) = splits.pop() {
+                    active = split.before;
+                    points.truncate(split.mark);
+                }
+                continue;
+            }
+            Op::Unary(_, target, _)
+            | Op::Binary(_, target, ..)
+            | Op::Select(target, ..)
+            | Op::Copy(target, _) => target as usize,
+        };
+        // The target is none of the operands: taken out, it can be written while they are read.
+        let mut taken = std::mem::take(&mut registers[target]);
+        let into = &mut taken[..length];
+        let list = match active {
+            Active::All => None,
+            Active::List(start, end) => Some(&points[start..end]),
+        };
+        match *op {
+            Op::Unary(op, _, a) => unary(op, into, inputs.fetch(a, registers), list),
+            Op::Binary(op, _, a, b) => {
+                binary(
+                    op,
+                    into,
+                    inputs.fetch(a, registers),
+                    inputs.fetch(b, registers),
+                    list,
+                );
+            }
+            Op::Select(_, c, a, b) => select(
+                into,
+                inputs.fetch(c, registers),
+                inputs.fetch(a, registers),
+                inputs.fetch(b, registers),
+                list,
+            ),
+            Op::Copy(_, a) => map(into, inputs.fetch(a, registers), list, |a| a),
+            Op::Split(..) | Op::Else(_) | Op::Join => {}
+        }
+        registers[target] = taken;
+    }
+    match inputs.fetch(program.result, registers) {
+        Source::Each(values) => out.copy_from_slice(values),
+        Source::Same(value) => out.fill(value),
+    }
+}
+
+fn is_empty(active: Active) -> bool {
+    matches!(active, Active::List(start, end) if start == end)
+}
+
+/// Parts the active points by the condition. A side that gets all of them stays what they were, so that a whole block
+/// is still worked on as one.
+fn divide(
+    condition: Source,
+    length: usize,
+    active: Active,
+    points: &mut Vec<u8>,
+) -> (Active, Active) {
+    let mark = points.len();
+    let count = match active {
+        Active::All => length,
+        Active::List(start, end) => end - start,
+    };
+    // Points where it holds from the front, the others from the back.
+    points.resize(mark + count, 0);
+    let (mut front, mut back) = (mark, mark + count);
+    for k in 0..count {
+        let point = match active {
+            Active::All => k as u8,
+            Active::List(start, _) => points[start + k],
+        };
+        if condition.at(point as usize) != 0.0 {
+            points[front] = point;
+            front += 1;
+        } else {
+            back -= 1;
+            points[back] = point;
+        }
+    }
+    let nobody = Active::List(mark, mark);
+    if back == mark {
+        (nobody, active)
+    } else if front == mark + count {
+        (active, nobody)
+    } else {
+        (Active::List(mark, front), Active::List(back, mark + count))
+    }
+}
+
+#[inline(always)]
+fn map(into: &mut [f64], a: Source, list: Option<&[u8]>, f: impl Fn(f64) -> f64) {
+    match (list, a) {
+        (None, Source::Each(a)) => {
+            for (into, a) in into.iter_mut().zip(a) {
+                *into = f(*a);
+            }
+        }
+        (None, Source::Same(a)) => into.fill(f(a)),
+        (Some(list), a) => {
+            for point in list {
+                let point = *point as usize;
+                into[point] = f(a.at(point));
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn zip(into: &mut [f64], a: Source, b: Source, list: Option<&[u8]>, f: impl Fn(f64, f64) -> f64) {
+    match (list, a, b) {
+        (None, Source::Each(a), Source::Each(b)) => {
+            for (into, (a, b)) in into.iter_mut().zip(a.iter().zip(b)) {
+                *into = f(*a, *b);
+            }
+        }
+        (None, Source::Each(a), Source::Same(b)) => {
+            for (into, a) in into.iter_mut().zip(a) {
+                *into = f(*a, b);
+            }
+        }
+        (None, Source::Same(a), Source::Each(b)) => {
+            for (into, b) in into.iter_mut().zip(b) {
+                *into = f(a, *b);
+            }
+        }
+        (None, Source::Same(a), Source::Same(b)) => into.fill(f(a, b)),
+        (Some(list), a, b) => {
+            for point in list {
+                let point = *point as usize;
+                into[point] = f(a.at(point), b.at(point));
+            }
+        }
+    }
+}
+
+fn select(into: &mut [f64], c: Source, a: Source, b: Source, list: Option<&[u8]>) {
+    let Source::Each(condition) = c else {
+        let chosen = if c.at(0) != 0.0 { a } else { b };
+        return map(into, chosen, list, |value| value);
+    };
+    if let Some(list) = list {
+        for point in list {
+            let point = *point as usize;
+            into[point] = if condition[point] != 0.0 {
+                a.at(point)
+            } else {
+                b.at(point)
+            };
+        }
+        return;
+    }
+    let pairs = into.iter_mut().zip(condition);
+    match (a, b) {
+        (Source::Each(a), Source::Each(b)) => {
+            for ((into, c), (a, b)) in pairs.zip(a.iter().zip(b)) {
+                *into = if *c != 0.0 { *a } else { *b };
+            }
+        }
+        (Source::Each(a), Source::Same(b)) => {
+            for ((into, c), a) in pairs.zip(a) {
+                *into = if *c != 0.0 { *a } else { b };
+            }
+        }
+        (Source::Same(a), Source::Each(b)) => {
+            for ((into, c), b) in pairs.zip(b) {
+                *into = if *c != 0.0 { a } else { *b };
+            }
+        }
+        (Source::Same(a), Source::Same(b)) => {
+            for (into, c) in pairs {
+                *into = if *c != 0.0 { a } else { b };
+            }
+        }
+    }
+}
+
+fn unary(op: Unary, into: &mut [f64], a: Source, list: Option<&[u8]>) {
+    // One loop for each operation, with the operation known in it.
+    macro_rules! loops {
+        ($($name:ident)*) => {
+            match op {
+                $(Unary::$name => map(into, a, list, |a| Unary::$name.apply(a)),)*
+            }
+        };
+    }
+    loops!(Neg Not Sin Cos Tan Asin Acos Atan Sinh Cosh Tanh Exp Ln Log10 Sqrt Cbrt Abs Sign Floor Ceil Step)
+}
+
+fn binary(op: Binary, into: &mut [f64], a: Source, b: Source, list: Option<&[u8]>) {
+    macro_rules! loops {
+        ($($name:ident)*) => {
+            match op {
+                $(Binary::$name => zip(into, a, b, list, |a, b| Binary::$name.apply(a, b)),)*
+            }
+        };
+    }
+    loops!(Add Sub Mul Div Pow Lt Le Gt Ge Eq Ne And Or Min Max Hypot Atan2)
+}

@@ -1,0 +1,149 @@
+//! A formula ready for use.
+
+use crate::compile::{Program, compile};
+use crate::derive;
+use crate::error::ParseError;
+use crate::eval;
+use crate::graph::{Graph, Node, prune};
+use crate::lower::lower;
+use crate::parser;
+use crate::scope::Scope;
+
+/// A variable to differentiate by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Variable {
+    /// The first coordinate, `x`.
+    X,
+    /// The second coordinate, `y`.
+    Y,
+}
+
+impl Variable {
+    fn node(self) -> Node {
+        match self {
+            Self::X => Node::X,
+            Self::Y => Node::Y,
+        }
+    }
+}
+
+/// A formula of `x`, `y` and `region`, parsed, folded and compiled. Evaluation needs no more than a shared reference,
+/// from any number of threads.
+#[derive(Debug, Clone)]
+pub struct Expression {
+    source: String,
+    /// What was written, with parameters put in and constants folded; the root is the last.
+    nodes: Vec<Node>,
+    program: Program,
+}
+
+impl Expression {
+    /// Parses a formula; the names in it are those of the language and of `scope`.
+    ///
+    /// # Errors
+    ///
+    /// [`ParseError`], with the place in `source`, when it is no formula or uses an unknown name.
+    pub fn parse(source: &str, scope: &Scope) -> Result<Self, ParseError> {
+        let (graph, root) = parser::parse(source, scope, true)?;
+        Ok(Self::build(source.to_owned(), prune(graph.nodes(), root)))
+    }
+
+    /// Parses a formula without `x`, `y` and `region` and works it out.
+    ///
+    /// # Errors
+    ///
+    /// As [`Expression::parse`], and when one of those three is used or the value is not finite.
+    pub fn parse_constant(source: &str, scope: &Scope) -> Result<f64, ParseError> {
+        let (graph, root) = parser::parse(source, scope, false)?;
+        let value =
+            Self::build(source.to_owned(), prune(graph.nodes(), root)).eval_at(0.0, 0.0, 0.0);
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            let message = format!("the value is {value}, not a finite number");
+            Err(ParseError::new(0..source.len(), message))
+        }
+    }
+
+    /// The formula that is a number everywhere.
+    pub fn number(value: f64) -> Self {
+        Self::build(value.to_string(), vec![Node::Number(value)])
+    }
+
+    fn build(source: String, nodes: Vec<Node>) -> Self {
+        let (graph, root): (Graph, _) = lower(&nodes);
+        let program = compile(&graph, root);
+        Self {
+            source,
+            nodes,
+            program,
+        }
+    }
+
+    /// The text it was parsed from; for a derivative `d/dx (text)`, which is not meant to be parsed.
+    pub fn source(&self) -> &str {
+        &self.source
+    }
+
+    /// The value, when it depends on none of `x`, `y` and `region`.
+    pub fn constant(&self) -> Option<f64> {
+        match self.nodes.last() {
+            Some(Node::Number(value)) => Some(*value),
+            _ => None,
+        }
+    }
+
+    /// Whether the value may depend on `region`.
+    pub fn uses_region(&self) -> bool {
+        self.nodes.contains(&Node::Region)
+    }
+
+    /// Whether the value may depend on the coordinate.
+    pub fn uses(&self, variable: Variable) -> bool {
+        self.nodes.contains(&variable.node())
+    }
+
+    /// Evaluates at the points `(x[i], y[i])` of the regions `region[i]` into `out[i]`. `region` may be empty: then it
+    /// is 0 everywhere. Values that are not finite are written as they are.
+    ///
+    /// Nothing is allocated once the thread has evaluated a formula as large; a block of 256 points is the best size.
+    ///
+    /// # Panics
+    ///
+    /// When the lengths differ.
+    pub fn eval(&self, x: &[f64], y: &[f64], region: &[f64], out: &mut [f64]) {
+        assert!(
+            x.len() == out.len() && y.len() == out.len(),
+            "as many values of `x` ({}) and `y` ({}) as results ({})",
+            x.len(),
+            y.len(),
+            out.len()
+        );
+        assert!(
+            region.is_empty() || region.len() == out.len(),
+            "as many values of `region` ({}) as results ({}), or none",
+            region.len(),
+            out.len()
+        );
+        eval::evaluate(&self.program, x, y, region, out);
+    }
+
+    /// The value at one point; [`Expression::eval`] gives the same bits for less work a point.
+    pub fn eval_at(&self, x: f64, y: f64, region: f64) -> f64 {
+        let mut out = [0.0];
+        eval::evaluate(&self.program, &[x], &[y], &[region], &mut out);
+        out[0]
+    }
+
+    /// The partial derivative, as a formula. Branches of `if` are differentiated as they stand; conditions, `step`,
+    /// `sign`, `floor`, `ceil` and `region` count as constant, `abs` gives `sign`, and `min` and `max` give the
+    /// derivative of the operand they pick.
+    pub fn derivative(&self, variable: Variable) -> Self {
+        let name = match variable {
+            Variable::X => "x",
+            Variable::Y => "y",
+        };
+        let nodes = derive::derivative(&self.nodes, variable.node());
+        Self::build(format!("d/d{name} ({})", self.source), nodes)
+    }
+}
