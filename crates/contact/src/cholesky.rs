@@ -3,8 +3,7 @@
 //! Always sequential: the digits of a result must not depend on the number of threads.
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::cholesky::llt::factor::LltError as Pivot;
-use faer::sparse::linalg::LltError;
+use faer::linalg::cholesky::llt::factor::LltError;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
     factorize_symbolic_cholesky,
@@ -93,7 +92,7 @@ impl Cholesky {
         );
         match result {
             Ok(_) => Ok(()),
-            Err(LltError::Numeric(Pivot::NonPositivePivot { index })) => {
+            Err(LltError::NonPositivePivot { index }) => {
                 // The index counts in the fill-reducing order.
                 let row = match self.symbolic.perm() {
                     Some(order) => order.arrays().0[index] as usize,
@@ -101,7 +100,6 @@ impl Cholesky {
                 };
                 Err(FactorError::Pivot(row))
             }
-            Err(LltError::Generic(_)) => Err(FactorError::TooLarge(matrix.order())),
         }
     }
 

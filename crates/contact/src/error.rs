@@ -24,7 +24,9 @@ pub enum SolveError {
         vertex: usize,
     },
     /// The boundary heights cross: the lower membrane is fixed above the upper one.
-    #[error("the boundary height {lower:e} of the lower membrane exceeds {upper:e} of the upper one at vertex {vertex}")]
+    #[error(
+        "the boundary height {lower:e} of the lower membrane exceeds {upper:e} of the upper one at vertex {vertex}"
+    )]
     HeightsCross {
         /// Vertex number.
         vertex: usize,
@@ -34,13 +36,17 @@ pub enum SolveError {
         lower: f64,
     },
     /// A stiffness matrix is not positive definite to double precision.
-    #[error("the stiffness matrix is not positive definite in double precision: the pivot at vertex {vertex} is not positive")]
+    #[error(
+        "the stiffness matrix is not positive definite in double precision: the pivot at vertex {vertex} is not positive"
+    )]
     NotPositiveDefinite {
         /// Vertex whose pivot failed.
         vertex: usize,
     },
     /// The factorisation outgrew memory or 32-bit indices.
-    #[error("the factorisation of a matrix of order {order} needs more memory or larger indices than there are")]
+    #[error(
+        "the factorisation of a matrix of order {order} needs more memory or larger indices than there are"
+    )]
     TooLarge {
         /// Order of the matrix.
         order: usize,
@@ -52,7 +58,9 @@ pub enum SolveError {
         reason: String,
     },
     /// The iterate that would be returned does not meet the tolerance.
-    #[error("the relative KKT residual {kkt_residual:.3e} exceeds the tolerance {tolerance:.3e} ({status:?})")]
+    #[error(
+        "the relative KKT residual {kkt_residual:.3e} exceeds the tolerance {tolerance:.3e} ({status:?})"
+    )]
     NotConverged {
         /// Relative KKT residual reached.
         kkt_residual: f64,

@@ -8,9 +8,14 @@ use crate::system::{Fields, System};
 /// Solves for the fields with the gap closed on a given set of vertices and no condition elsewhere.
 pub(crate) enum FreeSolver<'s> {
     /// One field: the pattern is kept, rows in contact are emptied.
-    Scalar(&'s mut ScalarFactor),
+    Scalar {
+        /// The factor, analysed.
+        factor: &'s mut ScalarFactor,
+        /// What its matrix stands for.
+        role: Role,
+    },
     /// Two fields: a vertex in contact has one unknown and the sum of both rows; built anew for every set.
-    Pair(PairFactor),
+    Pair(&'s mut PairFactor),
 }
 
 /// The factor of the two-field problem on one contact set.
@@ -26,11 +31,11 @@ impl FreeSolver<'_> {
     /// Factors the matrix that belongs to a contact set.
     pub fn prepare(&mut self, system: &System, contact: &[bool]) -> Result<(), SolveError> {
         match self {
-            FreeSolver::Scalar(factor) => {
+            FreeSolver::Scalar { factor, role } => {
                 if system.interior.iter().all(|j| contact[j]) {
                     return Ok(());
                 }
-                factor.truncated(system.matrices[0], Role::Stiffness, system.interior, contact)
+                factor.truncated(system.matrices[0], *role, system.interior, contact)
             }
             FreeSolver::Pair(factor) => factor.prepare(system, contact),
         }
@@ -46,12 +51,18 @@ impl FreeSolver<'_> {
         contact: &[bool],
     ) -> Result<(), SolveError> {
         match self {
-            FreeSolver::Scalar(factor) => {
+            FreeSolver::Scalar { factor, .. } => {
                 let free = |j: usize| !contact[j];
                 let mut rhs: Vec<f64> = system
                     .interior
                     .iter()
-                    .map(|j| if free(j) { system.residual(u, 0, j) } else { 0.0 })
+                    .map(|j| {
+                        if free(j) {
+                            system.residual(u, 0, j)
+                        } else {
+                            0.0
+                        }
+                    })
                     .collect();
                 if system.interior.iter().any(free) {
                     factor.solve(&mut rhs);

@@ -1,9 +1,22 @@
 //! The discrete problem of two membranes in unilateral contact, and its solvers.
 
+mod active_set;
+mod cholesky;
+pub mod error;
+mod free;
+mod interior;
+mod monotone;
 pub mod problem;
+mod reduce;
 pub mod settings;
 pub mod solution;
+mod solve;
+pub mod start;
+mod system;
 
+pub use error::SolveError;
 pub use problem::{DiscreteProblem, Tensions};
 pub use settings::{Settings, Solver, Tolerance};
 pub use solution::{Reduction, Solution, SolveInfo, Status, kkt_residual};
+pub use solve::{ACTIVE_SET_LIMIT, solve};
+pub use start::Start;

@@ -152,7 +152,11 @@ impl System<'_> {
     pub fn energy(&self, u: &Fields) -> f64 {
         (0..u.len())
             .map(|i| {
-                let dot: f64 = self.interior.iter().map(|j| u[i][j] * self.loads[i][j]).sum();
+                let dot: f64 = self
+                    .interior
+                    .iter()
+                    .map(|j| u[i][j] * self.loads[i][j])
+                    .sum();
                 0.5 * self.matrices[i].quadratic(&u[i]) - dot
             })
             .sum()

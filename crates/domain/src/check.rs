@@ -224,11 +224,7 @@ fn coincident_edges(mesh: &RawMesh, boundary: &[EdgeUse]) -> Result<(), MeshDefe
 }
 
 /// Boundary vertices in the interior of boundary edges.
-fn hanging_nodes(
-    mesh: &RawMesh,
-    points: &[Point],
-    boundary: &[EdgeUse],
-) -> Result<(), MeshDefect> {
+fn hanging_nodes(mesh: &RawMesh, points: &[Point], boundary: &[EdgeUse]) -> Result<(), MeshDefect> {
     let mut vertices: Vec<u32> = boundary.iter().flat_map(|e| e.vertices()).collect();
     vertices.sort_unstable();
     vertices.dedup();

@@ -103,7 +103,9 @@ pub enum DomainError {
         extent: f64,
     },
     /// The mesh would have more than [`MAX_TRIANGLES`] triangles.
-    #[error("mesh size `{size}` needs about `{triangles:.1e}` triangles, the limit is `{MAX_TRIANGLES:e}`")]
+    #[error(
+        "mesh size `{size}` needs about `{triangles:.1e}` triangles, the limit is `{MAX_TRIANGLES:e}`"
+    )]
     TooManyTriangles {
         /// Estimate.
         triangles: f64,
@@ -248,23 +250,45 @@ impl DomainError {
         let text = match self {
             Self::Size { .. } => "give a target edge length, for example a fifth of the diameter",
             Self::NotFinite { .. } | Self::VertexNotFinite { .. } => "give finite numbers",
-            Self::EmptyRectangle { .. } => "both coordinates of `lower` must be less than those of `upper`",
+            Self::EmptyRectangle { .. } => {
+                "both coordinates of `lower` must be less than those of `upper`"
+            }
             Self::Radius { .. } => "give a radius greater than 0",
-            Self::Extent { .. } => "choose units in which the domain is between 2^-500 and 2^500 across",
-            Self::TooManyTriangles { .. } => "start with a larger mesh size; adaptive refinement adds triangles where they pay",
-            Self::TooFine { .. } => "use a larger mesh size, or move the domain closer to the origin",
+            Self::Extent { .. } => {
+                "choose units in which the domain is between 2^-500 and 2^500 across"
+            }
+            Self::TooManyTriangles { .. } => {
+                "start with a larger mesh size; adaptive refinement adds triangles where they pay"
+            }
+            Self::TooFine { .. } => {
+                "use a larger mesh size, or move the domain closer to the origin"
+            }
             Self::TooFewPoints { .. } => "a closing point equal to the first one does not count",
             Self::VertexTiny { .. } => "write 0 instead",
             Self::RepeatedVertex { .. } => "remove one of them; a polygon must not touch itself",
-            Self::ZeroArea { .. } => "move at least one vertex off that line, or remove the polygon",
-            Self::SelfIntersection { .. } => "list the vertices in order along the outline, each once",
-            Self::PolygonsMeet { .. } => "keep holes apart from each other and from the outer polygon; join those that meet into one polygon",
+            Self::ZeroArea { .. } => {
+                "move at least one vertex off that line, or remove the polygon"
+            }
+            Self::SelfIntersection { .. } => {
+                "list the vertices in order along the outline, each once"
+            }
+            Self::PolygonsMeet { .. } => {
+                "keep holes apart from each other and from the outer polygon; join those that meet into one polygon"
+            }
             Self::HoleOutside { .. } => "remove the hole, or move it inside",
-            Self::HoleInHole { .. } => "islands inside holes are not supported; remove the inner polygon",
-            Self::LineOutside { .. } => "end the line on the outline and continue it as another line beyond a hole",
+            Self::HoleInHole { .. } => {
+                "islands inside holes are not supported; remove the inner polygon"
+            }
+            Self::LineOutside { .. } => {
+                "end the line on the outline and continue it as another line beyond a hole"
+            }
             Self::LineCrosses { .. } => "add the crossing point as a vertex to both",
-            Self::VertexLimit { .. } => "remove details, slits and thin parts that are far smaller than the mesh size",
-            Self::Generator { .. } => "simplify the polygon near its finest details, or mesh it with Gmsh and read the file",
+            Self::VertexLimit { .. } => {
+                "remove details, slits and thin parts that are far smaller than the mesh size"
+            }
+            Self::Generator { .. } => {
+                "simplify the polygon near its finest details, or mesh it with Gmsh and read the file"
+            }
             Self::Mesh(defect) => return defect.hint(),
         };
         Some(text.to_string())
@@ -386,51 +410,96 @@ impl MeshDefect {
     /// The message, with triangles named by `name`.
     pub fn describe(&self, name: &dyn Fn(usize) -> String) -> String {
         let path = |edge: &[Point; 2]| format!("`{}` to `{}`", Shown(edge[0]), Shown(edge[1]));
-        let corners = |c: &[Point; 3]| format!("`{}`, `{}`, `{}`", Shown(c[0]), Shown(c[1]), Shown(c[2]));
+        let corners =
+            |c: &[Point; 3]| format!("`{}`, `{}`, `{}`", Shown(c[0]), Shown(c[1]), Shown(c[2]));
         match self {
             Self::NoTriangles => "mesh has no triangles".to_string(),
-            Self::TooLarge { count } => format!("mesh has `{count}` vertices or triangles, too many for 32-bit indices"),
+            Self::TooLarge { count } => {
+                format!("mesh has `{count}` vertices or triangles, too many for 32-bit indices")
+            }
             Self::Regions { regions, triangles } => {
                 format!("mesh has `{regions}` regions for `{triangles}` triangles")
             }
             Self::UnknownVertex { triangle, vertex } => {
-                format!("{} refers to vertex `{vertex}`, which does not exist", name(*triangle))
+                format!(
+                    "{} refers to vertex `{vertex}`, which does not exist",
+                    name(*triangle)
+                )
             }
             Self::NotFinite { vertex, value } => {
-                format!("vertex {vertex} has a coordinate that is not finite: `{}`", Shown(*value))
+                format!(
+                    "vertex {vertex} has a coordinate that is not finite: `{}`",
+                    Shown(*value)
+                )
             }
             Self::Extent { extent } => format!("mesh extent `{extent:e}` is out of range"),
             Self::Unused { vertex, value } => {
-                format!("vertex {vertex} at `{}` belongs to no triangle", Shown(*value))
+                format!(
+                    "vertex {vertex} at `{}` belongs to no triangle",
+                    Shown(*value)
+                )
             }
-            Self::ZeroArea { triangle, corners: c } => {
+            Self::ZeroArea {
+                triangle,
+                corners: c,
+            } => {
                 format!("{} has zero area: {}", name(*triangle), corners(c))
             }
-            Self::Clockwise { triangle, corners: c } => {
+            Self::Clockwise {
+                triangle,
+                corners: c,
+            } => {
                 format!("{} is clockwise: {}", name(*triangle), corners(c))
             }
-            Self::Duplicate { triangles: [a, b], corners: c } => {
-                format!("{} and {} are the same triangle: {}", name(*a), name(*b), corners(c))
+            Self::Duplicate {
+                triangles: [a, b],
+                corners: c,
+            } => {
+                format!(
+                    "{} and {} are the same triangle: {}",
+                    name(*a),
+                    name(*b),
+                    corners(c)
+                )
             }
-            Self::SharedEdge { triangles: [a, b, c], edge } => format!(
+            Self::SharedEdge {
+                triangles: [a, b, c],
+                edge,
+            } => format!(
                 "edge {} is shared by more than two triangles: {}, {} and {}",
-                path(edge), name(*a), name(*b), name(*c)
+                path(edge),
+                name(*a),
+                name(*b),
+                name(*c)
             ),
-            Self::Fold { triangles: [a, b], edge } => format!(
+            Self::Fold {
+                triangles: [a, b],
+                edge,
+            } => format!(
                 "{} and {} overlap: they lie on the same side of their common edge {}",
-                name(*a), name(*b), path(edge)
+                name(*a),
+                name(*b),
+                path(edge)
             ),
             Self::Overlap { triangle, at } => format!(
                 "triangles overlap: those around the vertex `{}`, {} among them, wind around it more than once",
-                Shown(*at), name(*triangle)
+                Shown(*at),
+                name(*triangle)
             ),
             Self::HangingNode { triangle, edge, at } => format!(
                 "mesh is not conforming: vertex `{}` hangs in the edge {} of {}",
-                Shown(*at), path(edge), name(*triangle)
+                Shown(*at),
+                path(edge),
+                name(*triangle)
             ),
-            Self::CoincidentEdges { triangles: [a, b], edge } => format!(
+            Self::CoincidentEdges {
+                triangles: [a, b],
+                edge,
+            } => format!(
                 "{} and {} meet along {} but have separate vertices there",
-                name(*a), name(*b), path(edge)
+                name(*a),
+                name(*b),
+                path(edge)
             ),
         }
     }
@@ -459,13 +528,27 @@ impl MeshDefect {
     /// What to do instead.
     pub fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::NoTriangles => "save the surface elements: in Gmsh put the surface into a physical group, or set `Mesh.SaveAll = 1`",
-            Self::Duplicate { .. } => "a surface in two physical groups is saved twice; keep it in one",
-            Self::ZeroArea { .. } => "mesh again; in Gmsh `Mesh.Optimize` or a smaller size removes degenerate triangles",
-            Self::SharedEdge { .. } | Self::Fold { .. } | Self::Overlap { .. } => "surfaces overlap; in Gmsh cut them with `BooleanFragments` before meshing",
-            Self::HangingNode { .. } => "neighbouring triangles must share whole edges; in Gmsh join the surfaces with `BooleanFragments` before meshing",
-            Self::CoincidentEdges { .. } => "merge the double nodes: in Gmsh `Coherence Mesh`, or `BooleanFragments` before meshing",
-            Self::Extent { .. } => "choose units in which the mesh is between 2^-500 and 2^500 across",
+            Self::NoTriangles => {
+                "save the surface elements: in Gmsh put the surface into a physical group, or set `Mesh.SaveAll = 1`"
+            }
+            Self::Duplicate { .. } => {
+                "a surface in two physical groups is saved twice; keep it in one"
+            }
+            Self::ZeroArea { .. } => {
+                "mesh again; in Gmsh `Mesh.Optimize` or a smaller size removes degenerate triangles"
+            }
+            Self::SharedEdge { .. } | Self::Fold { .. } | Self::Overlap { .. } => {
+                "surfaces overlap; in Gmsh cut them with `BooleanFragments` before meshing"
+            }
+            Self::HangingNode { .. } => {
+                "neighbouring triangles must share whole edges; in Gmsh join the surfaces with `BooleanFragments` before meshing"
+            }
+            Self::CoincidentEdges { .. } => {
+                "merge the double nodes: in Gmsh `Coherence Mesh`, or `BooleanFragments` before meshing"
+            }
+            Self::Extent { .. } => {
+                "choose units in which the mesh is between 2^-500 and 2^500 across"
+            }
             _ => return None,
         };
         Some(text.to_string())

@@ -81,7 +81,10 @@ mod tests {
     fn known_triangles() {
         let right = one([[0., 0.], [1., 0.], [0., 1.]]);
         assert!((right.min_angle - 45.0).abs() < 1e-12);
-        assert!((right.max_aspect_ratio - (2.0 + 2f64.sqrt()) / (3f64.sqrt() * 2f64.sqrt())).abs() < 1e-12);
+        assert!(
+            (right.max_aspect_ratio - (2.0 + 2f64.sqrt()) / (3f64.sqrt() * 2f64.sqrt())).abs()
+                < 1e-12
+        );
         assert_eq!(right.shortest_edge, 1.0);
         let equal = one([[0., 0.], [1., 0.], [0.5, 0.75f64.sqrt()]]);
         assert!((equal.min_angle - 60.0).abs() < 1e-12);

@@ -11,9 +11,16 @@ const ROUND_OFF: f64 = 1e-9;
 /// A size may be missed by this factor before one more uniform refinement is asked for.
 const SIZE_SLACK: f64 = 1.25;
 
-/// The longest edge after `k >= 1` uniform refinements of the fan is below this times
-/// `radius / 2^k`: putting midpoints on the circle stretches the outer ring.
-const ARC_STRETCH: f64 = 1.28;
+/// A bound on the longest edge of a fan of radius 1 after `k` uniform refinements: `2^-k`, but for
+/// the outer ring, which putting midpoints on the circle stretches.
+fn longest_edge(k: u32) -> f64 {
+    let shrunk = 0.5f64.powi(k as i32);
+    if k == 0 {
+        1.0
+    } else {
+        shrunk * (1.2755 - 0.265 * shrunk)
+    }
+}
 
 pub(crate) fn check_size(size: f64) -> Result<(), DomainError> {
     if size > 0.0 && size.is_finite() {
@@ -66,7 +73,10 @@ pub fn rectangle(lower: Point, upper: Point, size: f64) -> Result<RawMesh, Domai
         }
     }
     let (nx, ny) = (xs.len() as u32 - 1, ys.len() as u32 - 1);
-    let points = ys.iter().flat_map(|&y| xs.iter().map(move |&x| [x, y])).collect();
+    let points = ys
+        .iter()
+        .flat_map(|&y| xs.iter().map(move |&x| [x, y]))
+        .collect();
     let mut cells = Vec::with_capacity(2 * nx as usize * ny as usize);
     for j in 0..ny {
         for i in 0..nx {
@@ -122,17 +132,15 @@ pub fn disk(center: Point, radius: f64, size: f64) -> Result<Disk, DomainError> 
         return Err(DomainError::Extent { extent: radius });
     }
     let mut refinements = 0;
-    let mut longest = radius;
-    while longest > SIZE_SLACK * size {
+    while radius * longest_edge(refinements) > SIZE_SLACK * size {
         refinements += 1;
-        let triangles = 8.0 * 4f64.powi(refinements as i32);
-        if triangles > MAX_TRIANGLES {
+        if 8.0 * 4f64.powi(refinements as i32) > MAX_TRIANGLES {
             // Not the number just passed, but what the size asks for.
             let triangles = 8.0 * (radius / size).powi(2);
             return Err(DomainError::TooManyTriangles { triangles, size });
         }
-        longest = ARC_STRETCH * radius / 2f64.powi(refinements as i32);
     }
+    let finest = radius * longest_edge(refinements);
     let s = radius * FRAC_1_SQRT_2;
     let r = radius;
     let rim = [
@@ -154,7 +162,7 @@ pub fn disk(center: Point, radius: f64, size: f64) -> Result<Disk, DomainError> 
         regions: vec![0; 8],
     };
     // A centre so far out that the rim rounds onto it, or loses its shape.
-    if crate::check::check(&fan).is_err() || longest <= 64.0 * f64::EPSILON * reach(center) {
+    if crate::check::check(&fan).is_err() || finest <= 64.0 * f64::EPSILON * reach(center) {
         return Err(DomainError::TooFine { size, at: center });
     }
     Ok(Disk { fan, refinements })
@@ -185,7 +193,10 @@ mod tests {
         assert_eq!(mesh.points[1], [0.5, 0.0]);
         assert_eq!(mesh.points[3], [0.0, 0.5]);
         assert_eq!(mesh.points[8], [1.0, 1.0]);
-        assert_eq!(mesh.triangles[..4], [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]);
+        assert_eq!(
+            mesh.triangles[..4],
+            [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]
+        );
         assert_eq!(mesh.regions, vec![0; 8]);
         check(&mesh).unwrap();
     }
@@ -230,18 +241,41 @@ mod tests {
         for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(unit(size), DomainError::Size { .. }), "{size}");
         }
-        assert!(matches!(unit(1e-5), DomainError::TooManyTriangles { triangles, .. } if (triangles - 2e10).abs() < 1e7));
+        assert!(
+            matches!(unit(1e-5), DomainError::TooManyTriangles { triangles, .. } if (triangles - 2e10).abs() < 1e7)
+        );
         assert!(matches!(unit(1e-300), DomainError::TooManyTriangles { .. }));
         let bad = |lower, upper| rectangle(lower, upper, 0.1).unwrap_err();
-        assert!(matches!(bad([f64::NAN, 0.0], [1.0, 1.0]), DomainError::NotFinite { name: "lower", .. }));
-        assert!(matches!(bad([0.0, 0.0], [1.0, f64::INFINITY]), DomainError::NotFinite { name: "upper", .. }));
-        assert!(matches!(bad([0.0, 1.0], [1.0, 1.0]), DomainError::EmptyRectangle { .. }));
-        assert!(matches!(bad([2.0, 0.0], [1.0, 1.0]), DomainError::EmptyRectangle { .. }));
-        assert!(matches!(bad([0.0, 0.0], [1e-180, 1.0]), DomainError::Extent { .. }));
-        assert!(matches!(bad([-1e308, 0.0], [1e308, 1.0]), DomainError::Extent { .. }));
+        assert!(matches!(
+            bad([f64::NAN, 0.0], [1.0, 1.0]),
+            DomainError::NotFinite { name: "lower", .. }
+        ));
+        assert!(matches!(
+            bad([0.0, 0.0], [1.0, f64::INFINITY]),
+            DomainError::NotFinite { name: "upper", .. }
+        ));
+        assert!(matches!(
+            bad([0.0, 1.0], [1.0, 1.0]),
+            DomainError::EmptyRectangle { .. }
+        ));
+        assert!(matches!(
+            bad([2.0, 0.0], [1.0, 1.0]),
+            DomainError::EmptyRectangle { .. }
+        ));
+        assert!(matches!(
+            bad([0.0, 0.0], [1e-180, 1.0]),
+            DomainError::Extent { .. }
+        ));
+        assert!(matches!(
+            bad([-1e308, 0.0], [1e308, 1.0]),
+            DomainError::Extent { .. }
+        ));
         let far = rectangle([1e16, 0.0], [1e16 + 10.0, 1.0], 1.0).unwrap_err();
         assert!(matches!(far, DomainError::TooFine { .. }));
-        assert_eq!(unit(-1.0).to_string(), "mesh size `-1` is not a positive number");
+        assert_eq!(
+            unit(-1.0).to_string(),
+            "mesh size `-1` is not a positive number"
+        );
         assert!(unit(-1.0).hint().is_some());
     }
 
@@ -270,27 +304,42 @@ mod tests {
                 let n = m[0].hypot(m[1]);
                 if bent { [m[0] / n, m[1] / n] } else { m }
             };
-            let bent = |a: Point, b: Point| rim(a) && rim(b) && crate::geometry::distance(a, b) < 0.8 / 2f64.powi(level as i32) ;
+            let bent = |a: Point, b: Point| {
+                rim(a) && rim(b) && crate::geometry::distance(a, b) < 0.8 / 2f64.powi(level as i32)
+            };
             triangles = triangles
                 .iter()
                 .flat_map(|&[a, b, c]| {
-                    let (ab, bc, ca) = (middle(a, b, bent(a, b)), middle(b, c, bent(b, c)), middle(c, a, bent(c, a)));
+                    let (ab, bc, ca) = (
+                        middle(a, b, bent(a, b)),
+                        middle(b, c, bent(b, c)),
+                        middle(c, a, bent(c, a)),
+                    );
                     [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
                 })
                 .collect();
         }
         let d = crate::geometry::distance;
-        triangles.iter().flat_map(|&[a, b, c]| [d(a, b), d(b, c), d(c, a)]).fold(0.0, f64::max)
+        triangles
+            .iter()
+            .flat_map(|&[a, b, c]| [d(a, b), d(b, c), d(c, a)])
+            .fold(0.0, f64::max)
     }
 
     #[test]
     fn refinements_reach_the_size() {
         for size in [2.0, 1.0, 0.81, 0.79, 0.5, 0.4, 0.25, 0.1, 0.03] {
             let k = disk([0.0, 0.0], 1.0, size).unwrap().refinements;
-            assert!(longest_after(k) <= 1.25 * size, "size {size}, {k} refinements");
+            assert!(
+                longest_after(k) <= 1.25 * size,
+                "size {size}, {k} refinements"
+            );
             if k > 0 {
-                // One less would miss it, up to the slack of the bound on the stretch.
-                assert!(1.28 * longest_after(k - 1) > 1.25 * size, "size {size}, {k} refinements");
+                // One less would miss it, up to the slack of the bound.
+                assert!(
+                    1.02 * longest_after(k - 1) > 1.25 * size,
+                    "size {size}, {k} refinements"
+                );
             }
         }
         assert_eq!(disk([0.0, 0.0], 1.0, 0.25).unwrap().refinements, 2);
@@ -317,11 +366,26 @@ mod tests {
         assert!(matches!(bad(o, 1.0, 0.0), DomainError::Size { .. }));
         assert!(matches!(bad(o, 0.0, 1.0), DomainError::Radius { .. }));
         assert!(matches!(bad(o, -2.0, 1.0), DomainError::Radius { .. }));
-        assert!(matches!(bad(o, f64::NAN, 1.0), DomainError::NotFinite { name: "radius", .. }));
-        assert!(matches!(bad([f64::NAN, 0.0], 1.0, 1.0), DomainError::NotFinite { name: "center", .. }));
+        assert!(matches!(
+            bad(o, f64::NAN, 1.0),
+            DomainError::NotFinite { name: "radius", .. }
+        ));
+        assert!(matches!(
+            bad([f64::NAN, 0.0], 1.0, 1.0),
+            DomainError::NotFinite { name: "center", .. }
+        ));
         assert!(matches!(bad(o, 1e200, 1e200), DomainError::Extent { .. }));
-        assert!(matches!(bad(o, 1.0, 1e-6), DomainError::TooManyTriangles { .. }));
-        assert!(matches!(bad(o, 1.0, 1e-320), DomainError::TooManyTriangles { .. }));
-        assert!(matches!(bad([1e17, 0.0], 1.0, 0.5), DomainError::TooFine { .. }));
+        assert!(matches!(
+            bad(o, 1.0, 1e-6),
+            DomainError::TooManyTriangles { .. }
+        ));
+        assert!(matches!(
+            bad(o, 1.0, 1e-320),
+            DomainError::TooManyTriangles { .. }
+        ));
+        assert!(matches!(
+            bad([1e17, 0.0], 1.0, 0.5),
+            DomainError::TooFine { .. }
+        ));
     }
 }

@@ -9,7 +9,9 @@ use domain::{RawMesh, gmsh, polygon, rectangle};
 use proptest::prelude::*;
 
 fn data(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data")
+        .join(name)
 }
 
 fn parse(bytes: &[u8]) -> RawMesh {
@@ -51,16 +53,41 @@ fn sample() -> RawMesh {
 fn every_format_gives_back_the_mesh() {
     let styles = [
         PLAIN,
-        Style { clutter: true, z: -2.5, ..PLAIN },
-        Style { offset: 100, stride: 37, ..PLAIN },
-        Style { reverse: true, ..PLAIN },
-        Style { reverse: true, offset: 5, stride: 1000, clutter: true, z: 1e-3 },
+        Style {
+            clutter: true,
+            z: -2.5,
+            ..PLAIN
+        },
+        Style {
+            offset: 100,
+            stride: 37,
+            ..PLAIN
+        },
+        Style {
+            reverse: true,
+            ..PLAIN
+        },
+        Style {
+            reverse: true,
+            offset: 5,
+            stride: 1000,
+            clutter: true,
+            z: 1e-3,
+        },
     ];
     for mesh in [sample(), rectangle([0.0, 0.0], [1.0, 1.0], 1.0).unwrap()] {
         for style in styles {
             for format in FORMATS {
-                assert_eq!(parse(&write22(&mesh, format, style)), mesh, "2.2 {format:?} {style:?}");
-                assert_eq!(parse(&write41(&mesh, format, style)), mesh, "4.1 {format:?} {style:?}");
+                assert_eq!(
+                    parse(&write22(&mesh, format, style)),
+                    mesh,
+                    "2.2 {format:?} {style:?}"
+                );
+                assert_eq!(
+                    parse(&write41(&mesh, format, style)),
+                    mesh,
+                    "4.1 {format:?} {style:?}"
+                );
             }
         }
     }
@@ -69,7 +96,11 @@ fn every_format_gives_back_the_mesh() {
 #[test]
 fn tags_beyond_32_bits_are_read() {
     let mesh = sample();
-    let style = Style { offset: 1 << 40, stride: 1 << 33, ..PLAIN };
+    let style = Style {
+        offset: 1 << 40,
+        stride: 1 << 33,
+        ..PLAIN
+    };
     for format in FORMATS {
         assert_eq!(parse(&write41(&mesh, format, style)), mesh);
     }
@@ -160,12 +191,16 @@ fn ascii_triangle(x: f64, y: f64) -> [String; 2] {
         format!(
             "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 {}\n2 {}\n3 {}\n$EndNodes\n\
              $Elements\n1\n1 2 0 1 2 3\n$EndElements\n",
-            row(0), row(1), row(2)
+            row(0),
+            row(1),
+            row(2)
         ),
         format!(
             "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 3 1 3\n2 1 0 3\n1\n2\n3\n{}\n{}\n{}\n$EndNodes\n\
              $Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n",
-            row(0), row(1), row(2)
+            row(0),
+            row(1),
+            row(2)
         ),
     ]
 }
@@ -196,7 +231,10 @@ mod mutations {
 
     fn originals() -> Vec<Vec<u8>> {
         let mesh = rectangle([0.0, 0.0], [2.0, 1.0], 1.0).unwrap();
-        let style = Style { clutter: true, ..PLAIN };
+        let style = Style {
+            clutter: true,
+            ..PLAIN
+        };
         FORMATS
             .iter()
             .flat_map(|&f| [write22(&mesh, f, style), write41(&mesh, f, style)])

@@ -32,7 +32,10 @@ fn largest(mesh: &RawMesh) -> f64 {
 
 fn assert_area(mesh: &RawMesh, wanted: f64) {
     let found = area(mesh);
-    assert!((found - wanted).abs() <= 1e-12 * wanted, "{found} for {wanted}");
+    assert!(
+        (found - wanted).abs() <= 1e-12 * wanted,
+        "{found} for {wanted}"
+    );
 }
 
 /// Total length of the mesh edges that lie on the segment from `a` to `b`.
@@ -40,7 +43,11 @@ fn covered(mesh: &RawMesh, a: P, b: P) -> f64 {
     let length = geometry::distance(a, b);
     let on = |p: P| {
         geometry::cross(a, b, p).abs() <= 1e-9 * length * length
-            && geometry::in_box([a[0].min(b[0]) - 1e-9, a[1].min(b[1]) - 1e-9], [a[0].max(b[0]) + 1e-9, a[1].max(b[1]) + 1e-9], p)
+            && geometry::in_box(
+                [a[0].min(b[0]) - 1e-9, a[1].min(b[1]) - 1e-9],
+                [a[0].max(b[0]) + 1e-9, a[1].max(b[1]) + 1e-9],
+                p,
+            )
     };
     let mut edges = std::collections::BTreeSet::new();
     for corners in &mesh.triangles {
@@ -61,7 +68,14 @@ fn square(x: f64, y: f64, side: f64) -> Vec<P> {
     vec![[x, y], [x + side, y], [x + side, y + side], [x, y + side]]
 }
 
-const ELL: [P; 6] = [[-1., -1.], [0., -1.], [0., 0.], [1., 0.], [1., 1.], [-1., 1.]];
+const ELL: [P; 6] = [
+    [-1., -1.],
+    [0., -1.],
+    [0., 0.],
+    [1., 0.],
+    [1., 1.],
+    [-1., 1.],
+];
 
 #[test]
 fn unit_square() {
@@ -135,7 +149,10 @@ fn lines_are_kept_as_edges() {
         for pair in line.windows(2) {
             let wanted = geometry::distance(pair[0], pair[1]);
             let found = covered(&m, pair[0], pair[1]);
-            assert!((found - wanted).abs() < 1e-9, "{pair:?}: {found} for {wanted}");
+            assert!(
+                (found - wanted).abs() < 1e-9,
+                "{pair:?}: {found} for {wanted}"
+            );
         }
     }
     assert!(q.meets_angle_limit(), "{q:?}");
@@ -163,9 +180,16 @@ fn lines_do_not_confuse_inside_and_outside() {
     let (m, _) = mesh(&square(0.0, 0.0, 8.0), &holes, &lines, 1.0);
     assert_area(&m, 62.0);
     // In a domain that is not convex, too.
-    let lines = [vec![[-1.0, 0.0], [0.0, 0.0]], vec![[0.0, 0.0], [0.0, 1.0]], vec![[-0.5, -0.5], [-0.5, 0.5]]];
+    let lines = [
+        vec![[-1.0, 0.0], [0.0, 0.0]],
+        vec![[0.0, 0.0], [0.0, 1.0]],
+        vec![[-0.5, -0.5], [-0.5, 0.5]],
+    ];
     // The third crosses the first.
-    assert!(matches!(polygon(&ELL, &[], &lines, 0.2), Err(DomainError::LineCrosses { .. })));
+    assert!(matches!(
+        polygon(&ELL, &[], &lines, 0.2),
+        Err(DomainError::LineCrosses { .. })
+    ));
     let (m, q) = mesh(&ELL, &[], &lines[..2], 0.2);
     assert_area(&m, 3.0);
     assert!(q.meets_angle_limit(), "{q:?}");
@@ -180,7 +204,12 @@ fn lines_along_the_outline_and_ends_off_it_by_rounding() {
         let at = |a: P, b: P| [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
         vec![at(triangle[0], triangle[1]), at(triangle[2], triangle[1])]
     };
-    let lines = [ends(1.0 / 3.0), ends(0.7), vec![triangle[0], triangle[2]], vec![triangle[0], triangle[2]]];
+    let lines = [
+        ends(1.0 / 3.0),
+        ends(0.7),
+        vec![triangle[0], triangle[2]],
+        vec![triangle[0], triangle[2]],
+    ];
     let (m, _) = mesh(&triangle, &[], &lines, 0.3);
     assert_area(&m, 0.5 * geometry::twice_area(&triangle));
     for line in &lines[..2] {
@@ -188,28 +217,53 @@ fn lines_along_the_outline_and_ends_off_it_by_rounding() {
         assert!((covered(&m, line[0], line[1]) - wanted).abs() < 1e-9);
     }
     // A line through a reflex corner, and one through the vertex of another line.
-    let (m, _) = mesh(&ELL, &[], &[vec![[-0.5, -0.5], [0.5, 0.5]], vec![[-0.8, 0.5], [-0.2, 0.5]], vec![[-0.5, 0.5], [-0.5, 0.8]]], 0.3);
+    let (m, _) = mesh(
+        &ELL,
+        &[],
+        &[
+            vec![[-0.5, -0.5], [0.5, 0.5]],
+            vec![[-0.8, 0.5], [-0.2, 0.5]],
+            vec![[-0.5, 0.5], [-0.5, 0.8]],
+        ],
+        0.3,
+    );
     assert_area(&m, 3.0);
 }
 
 #[test]
 fn small_input_angles_are_reported_not_refused() {
     let degrees = 5f64.to_radians();
-    let spike = [[0.0, 0.0], [2.0, 0.0], [2.0 * degrees.cos(), 2.0 * degrees.sin()]];
+    let spike = [
+        [0.0, 0.0],
+        [2.0, 0.0],
+        [2.0 * degrees.cos(), 2.0 * degrees.sin()],
+    ];
     let (m, q) = mesh(&spike, &[], &[], 0.2);
     assert_area(&m, 0.5 * geometry::twice_area(&spike));
     assert!(!q.meets_angle_limit());
     assert!((q.min_angle - 5.0).abs() < 1e-6, "{q:?}");
     // Twenty degrees are no reason for less.
     let degrees = 20f64.to_radians();
-    let wedge = [[0.0, 0.0], [2.0, 0.0], [2.0 * degrees.cos(), 2.0 * degrees.sin()]];
+    let wedge = [
+        [0.0, 0.0],
+        [2.0, 0.0],
+        [2.0 * degrees.cos(), 2.0 * degrees.sin()],
+    ];
     let (_, q) = mesh(&wedge, &[], &[], 0.2);
     assert!(q.min_angle > 19.99, "{q:?}");
 }
 
 #[test]
 fn narrow_notch() {
-    let notch = [[0., 0.], [2., 0.], [2., 2.], [1.001, 2.], [1.0005, 0.5], [1., 2.], [0., 2.]];
+    let notch = [
+        [0., 0.],
+        [2., 0.],
+        [2., 2.],
+        [1.001, 2.],
+        [1.0005, 0.5],
+        [1., 2.],
+        [0., 2.],
+    ];
     let (m, q) = mesh(&notch, &[], &[], 0.3);
     assert_area(&m, 0.5 * geometry::twice_area(&notch));
     assert!(q.meets_angle_limit(), "{q:?}");
@@ -244,7 +298,12 @@ fn powers_of_two_scale_bitwise() {
     let hole = vec![[1.0, 0.5], [1.6, 0.45], [1.4, 0.9]];
     let line = vec![[0.1, 0.2], [0.7, 0.9]];
     let scaled = |s: f64| {
-        let times = |points: &[P]| points.iter().map(|p| [p[0] * s, p[1] * s]).collect::<Vec<P>>();
+        let times = |points: &[P]| {
+            points
+                .iter()
+                .map(|p| [p[0] * s, p[1] * s])
+                .collect::<Vec<P>>()
+        };
         mesh(&times(&outer), &[times(&hole)], &[times(&line)], 0.3 * s)
     };
     let (base, base_quality) = scaled(1.0);
@@ -289,13 +348,16 @@ fn star(center: P, radii: &[f64], jitter: &[f64]) -> Vec<P> {
     (0..n)
         .map(|k| {
             let t = std::f64::consts::TAU * (k as f64 + 0.9 * jitter[k % jitter.len()]) / n as f64;
-            [center[0] + radii[k] * t.cos(), center[1] + radii[k] * t.sin()]
+            [
+                center[0] + radii[k] * t.cos(),
+                center[1] + radii[k] * t.sin(),
+            ]
         })
         .collect()
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(5000) })]
 
     #[test]
     fn stars_are_meshed(
@@ -319,6 +381,26 @@ proptest! {
                     DomainError::HoleOutside { .. } | DomainError::PolygonsMeet { .. } | DomainError::LineOutside { .. } | DomainError::LineCrosses { .. }
                     | DomainError::SelfIntersection { .. }), "{}", e),
             }
+        }
+    }
+
+    #[test]
+    fn needles_are_meshed_or_refused(
+        exponents in prop::collection::vec(-7.0..0.0f64, 3..12),
+        jitter in prop::collection::vec(0.0..1.0f64, 12),
+        with_line in any::<bool>(),
+    ) {
+        // Radii over seven orders of magnitude: angles from almost 0 to almost 360 degrees.
+        let radii: Vec<f64> = exponents.iter().map(|&e| 10f64.powf(e)).collect();
+        let outer = star([0.3, -0.7], &radii, &jitter);
+        let lines = if with_line { vec![vec![outer[0], [0.3, -0.7]]] } else { vec![] };
+        match polygon(&outer, &[], &lines, 1.0) {
+            Ok((m, _)) => {
+                let wanted = 0.5 * geometry::twice_area(&outer).abs();
+                prop_assert!((area(&m) - wanted).abs() < 1e-9 * wanted);
+            }
+            Err(DomainError::Generator { what }) => prop_assert!(false, "{}", what),
+            Err(e) => prop_assert!(!e.to_string().is_empty()),
         }
     }
 

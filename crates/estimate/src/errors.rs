@@ -156,7 +156,7 @@ impl<'a> SquaredError<'a> {
             plain: vec![0.0; discrete.len()],
             weighted,
         };
-        integrate(mesh, CONTROL, &mut integrand)?;
+        integrate(mesh, Control{tolerance: std::env::var("TOL").unwrap().parse().unwrap(),..CONTROL}, &mut integrand)?;
         Ok(integrand)
     }
 }

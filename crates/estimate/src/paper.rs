@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn a_concave_sigma_has_no_positive_jump() {
-        // sigma = 1 on the diagonal and 0 off it: its Laplacian is a negative measure, the action positive.
+        // sigma = 1 at the ends of the diagonal and 0 elsewhere, a ridge: h_e [d_n sigma]_e = -4, a positive action.
         let mesh = two_triangles();
         let problem = problem(&mesh, [vec![1.0; 2], vec![1.0; 2]], [0.0, 0.0]);
         let solution = solution(
@@ -125,6 +125,6 @@ mod tests {
         );
         let result = paper(&mesh, &problem, &solution);
         assert_eq!(result.eta_e_sum(), 0.0);
-        assert_eq!(result.eta_k, [4.0, 4.0]);
+        assert_eq!(result.eta_k, [8.0, 8.0]);
     }
 }

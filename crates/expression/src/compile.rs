@@ -316,3 +316,79 @@ fn allocate(mut ops: Vec<Op>, virtuals: usize, mut result: Operand) -> Program {
         result,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lower::lower;
+    use crate::scope::Scope;
+
+    fn program(source: &str) -> Program {
+        let (graph, root) = crate::parser::parse(source, &Scope::new(), true).unwrap();
+        let nodes = crate::graph::prune(graph.nodes(), root);
+        let (graph, root) = lower(&nodes);
+        compile(&graph, root)
+    }
+
+    /// The instructions as one letter each: `s`, `c` sine and cosine, `p` a product, `.` others, `(|)` a choice that
+    /// splits, `?` one that does not, `=` a copy.
+    fn shape(source: &str) -> String {
+        let letter = |op: &Op| match op {
+            Op::Unary(Unary::Sin, ..) => 's',
+            Op::Unary(Unary::Cos, ..) => 'c',
+            Op::Binary(Binary::Mul, ..) => 'p',
+            Op::Unary(..) | Op::Binary(..) => '.',
+            Op::Select(..) => '?',
+            Op::Copy(..) => '=',
+            Op::Split(..) => '(',
+            Op::Else(_) => '|',
+            Op::Join => ')',
+        };
+        program(source).ops.iter().map(letter).collect()
+    }
+
+    #[test]
+    fn common_subexpressions_are_computed_once() {
+        assert_eq!(shape("sin(x*y) + sin(y*x)"), "ps.");
+        assert_eq!(shape("x^2 + x^4 + x^6"), "pp.p.");
+        assert_eq!(shape("x^2 + 1/x^2"), "p..");
+    }
+
+    #[test]
+    fn work_of_a_branch_stays_in_it() {
+        assert_eq!(shape("if(x > 0, sin(x), cos(x))"), ".(s|c)");
+        assert_eq!(shape("if(x > 0, sin(x), 2)"), ".(s|=)");
+        assert_eq!(shape("x > 0 && sin(x) > 0"), ".(s.|=)");
+        // Computed before: served inside. Computed inside: computed again outside and in the other branch.
+        assert_eq!(shape("sin(x)*if(x > 0, sin(x)^2, cos(x))"), "s.(p|c)p");
+        assert_eq!(
+            shape("if(x > 0, sin(x)^2, sin(x)*cos(x))*sin(x)"),
+            ".(sp|scp)sp"
+        );
+        assert_eq!(
+            shape("if(x > 0, if(y > 0, sin(x), cos(x)), sin(y))"),
+            ".(.(s|c)=|s)"
+        );
+    }
+
+    #[test]
+    fn cheap_choices_are_made_without_a_split() {
+        assert_eq!(shape("if(x^2 + y^2 < 0.5, -10, -8)"), "pp..?");
+        assert_eq!(shape("if(x > 0 && y > 0, x*y, x - y)"), "..?p.?");
+        let nine = "x*y + x - y + 2*x - 3*y + 1/x + x*x";
+        assert!(shape(&format!("if(x > 0, {nine}, 0)")).contains('('));
+    }
+
+    #[test]
+    fn registers_are_used_again_and_never_read_while_written() {
+        let chain = program(&format!("x{}", "+sin(x+1)*y".repeat(500)));
+        assert!(chain.registers <= 4, "{}", chain.registers);
+        for op in program("if(x > 0, sin(x)*x + cos(x), sin(y) - x)*sin(x + sin(y))").ops {
+            let mut op = op;
+            let target = op.target_mut().copied();
+            for operand in op.operands_mut() {
+                assert!(target.is_none_or(|target| *operand != Operand::Register(target)));
+            }
+        }
+    }
+}

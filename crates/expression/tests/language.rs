@@ -58,7 +58,10 @@ fn operators_bind_as_the_table_says() {
     ];
     for (source, expected) in table {
         if expected.is_nan() {
-            assert!(Expression::parse(source, &Scope::new()).is_err(), "{source}");
+            assert!(
+                Expression::parse(source, &Scope::new()).is_err(),
+                "{source}"
+            );
         } else {
             assert_eq!(at(source, x, 0.0), expected, "{source}");
         }
@@ -153,7 +156,10 @@ fn parameters_are_put_in_and_constants_folded() {
     assert!(uses_region("if(region == 2, 1, 0)"));
     assert!(!uses_region("if(1, x, region)"));
     assert_eq!(Expression::number(2.5).constant(), Some(2.5));
-    assert_eq!(Expression::parse(" x + 1", &scope).unwrap().source(), " x + 1");
+    assert_eq!(
+        Expression::parse(" x + 1", &scope).unwrap().source(),
+        " x + 1"
+    );
 }
 
 #[test]
@@ -233,7 +239,10 @@ fn lengths_must_agree() {
 
 /// On a thread with a small stack, so that a recursion over the length of a formula would be seen.
 fn on_a_small_stack(work: impl FnOnce() + Send + 'static) {
-    let thread = std::thread::Builder::new().stack_size(1 << 20).spawn(work).unwrap();
+    let thread = std::thread::Builder::new()
+        .stack_size(1 << 20)
+        .spawn(work)
+        .unwrap();
     thread.join().unwrap();
 }
 
@@ -287,7 +296,10 @@ fn long_chains_work() {
         let largest = parse(&format!("max({})", arguments.join(",")));
         let x = 0.3f64;
         let sines = (0..10_000).map(|k| ((f64::from(k) * x).sin(), f64::from(k)));
-        let (height, k) = sines.fold((-1.0, 0.0), |best, one| if one.0 > best.0 { one } else { best });
+        let (height, k) = sines.fold(
+            (-1.0, 0.0),
+            |best, one| if one.0 > best.0 { one } else { best },
+        );
         assert_eq!(largest.eval_at(x, 0.0, 0.0), height);
         let slope = largest.derivative(X).eval_at(x, 0.0, 0.0);
         assert_eq!(slope, (k * x).cos() * k);
@@ -315,8 +327,14 @@ fn scaling_by_powers_of_two_scales_the_bits() {
     // Homogeneous of degree 3 (the first three) and 0.
     let formulas = [
         (3, "x^3/3 - 0.7*y*x^2 + abs(x)*y^2 - hypot(x, y)*x*y/1.3"),
-        (3, "if(x^2 + y^2 < 0.3*x*y + x^2, x^3*1.7, y^5/(x^2 + y^2)) + sqrt(x^2 + y^2)*x^2"),
-        (3, "x^13*y^-10*0.1 - min(x, y, x + y)^3/7 + step(x - y)*x^48/y^45"),
+        (
+            3,
+            "if(x^2 + y^2 < 0.3*x*y + x^2, x^3*1.7, y^5/(x^2 + y^2)) + sqrt(x^2 + y^2)*x^2",
+        ),
+        (
+            3,
+            "x^13*y^-10*0.1 - min(x, y, x + y)^3/7 + step(x - y)*x^48/y^45",
+        ),
         (0, "atan2(y, x)*sin(x/y) + x^17/(y^17 + x^17)"),
     ];
     let points: Vec<(f64, f64)> = (1..200)
@@ -331,7 +349,11 @@ fn scaling_by_powers_of_two_scales_the_bits() {
             for (x, y) in &points {
                 let scaled = at(formula, scale * x, scale * y);
                 let expected = at(formula, *x, *y) * scale.powi(degree);
-                assert_eq!(scaled.to_bits(), expected.to_bits(), "{formula} at {x}, {y} by 2^{power}");
+                assert_eq!(
+                    scaled.to_bits(),
+                    expected.to_bits(),
+                    "{formula} at {x}, {y} by 2^{power}"
+                );
             }
         }
     }

@@ -17,7 +17,12 @@ fn error(source: &str) -> ParseError {
 fn mistakes_are_located_and_explained() {
     let table: [(&str, Range<usize>, &str, &str); 44] = [
         ("2*ga", 2..4, "unknown name `ga`", "did you mean `g`?"),
-        ("1 + radios", 4..10, "unknown name `radios`", "did you mean `radius`?"),
+        (
+            "1 + radios",
+            4..10,
+            "unknown name `radios`",
+            "did you mean `radius`?",
+        ),
         ("X + 1", 0..1, "unknown name `X`", "did you mean `x`?"),
         ("1 + xy", 4..6, "unknown name `xy`", "write `x*y`"),
         (
@@ -26,9 +31,24 @@ fn mistakes_are_located_and_explained() {
             "unknown name `z`",
             "the names are `x`, `y`, `region`, `pi`, `e`, `g`, `radius`",
         ),
-        ("x and y", 2..5, "an operator is missing before `and`", "write `&&`"),
-        ("sen(x)", 0..3, "unknown function `sen`", "did you mean `sin`?"),
-        ("arctan(x)", 0..6, "unknown function `arctan`", "did you mean `atan`?"),
+        (
+            "x and y",
+            2..5,
+            "an operator is missing before `and`",
+            "write `&&`",
+        ),
+        (
+            "sen(x)",
+            0..3,
+            "unknown function `sen`",
+            "did you mean `sin`?",
+        ),
+        (
+            "arctan(x)",
+            0..6,
+            "unknown function `arctan`",
+            "did you mean `atan`?",
+        ),
         ("pow(x, 2)", 0..3, "unknown function `pow`", "write `a^b`"),
         (
             "1 + sin x",
@@ -54,7 +74,12 @@ fn mistakes_are_located_and_explained() {
             "`if` takes 3 arguments, not 2",
             "write `if(condition, then, else)`",
         ),
-        ("sin()", 0..5, "`sin` takes 1 argument, not 0", "write `sin(a)`"),
+        (
+            "sin()",
+            0..5,
+            "`sin` takes 1 argument, not 0",
+            "write `sin(a)`",
+        ),
         (
             "sin(0,5)",
             0..8,
@@ -85,9 +110,24 @@ fn mistakes_are_located_and_explained() {
         ("x $ y", 2..3, "unexpected character `$`", ""),
         ("x + µ", 4..6, "unexpected character `µ`", ""),
         ("x² + 1", 1..3, "unexpected character `²`", "write `^2`"),
-        ("x = 1", 2..3, "`=` is not an operator", "write `==` to compare"),
-        ("x ** 2", 2..4, "`**` is not an operator", "write `^` for a power"),
-        ("x & y", 2..3, "`&` is not an operator", "write `&&` for and"),
+        (
+            "x = 1",
+            2..3,
+            "`=` is not an operator",
+            "write `==` to compare",
+        ),
+        (
+            "x ** 2",
+            2..4,
+            "`**` is not an operator",
+            "write `^` for a power",
+        ),
+        (
+            "x & y",
+            2..3,
+            "`&` is not an operator",
+            "write `&&` for and",
+        ),
         (
             "|x|",
             0..1,
@@ -107,10 +147,30 @@ fn mistakes_are_located_and_explained() {
             "comparisons cannot be chained",
             "write `x == y && y != 1`",
         ),
-        ("2x", 1..2, "an operator is missing before `x`", "write `2*x`"),
-        ("2(x + 1)", 1..2, "an operator is missing before `(`", "write `2*(...)`"),
-        ("(x)(y)", 3..4, "an operator is missing before `(`", "write `(...)*(...)`"),
-        ("1 + 3 pi", 6..8, "an operator is missing before `pi`", "write `3*pi`"),
+        (
+            "2x",
+            1..2,
+            "an operator is missing before `x`",
+            "write `2*x`",
+        ),
+        (
+            "2(x + 1)",
+            1..2,
+            "an operator is missing before `(`",
+            "write `2*(...)`",
+        ),
+        (
+            "(x)(y)",
+            3..4,
+            "an operator is missing before `(`",
+            "write `(...)*(...)`",
+        ),
+        (
+            "1 + 3 pi",
+            6..8,
+            "an operator is missing before `pi`",
+            "write `3*pi`",
+        ),
         ("1 2", 2..3, "an operator is missing before `2`", ""),
         (
             "1_000",
@@ -147,26 +207,41 @@ fn the_first_mistake_is_the_one_reported() {
 
 #[test]
 fn the_hint_stands_on_its_own_line() {
-    assert_eq!(error("2x").to_string(), "an operator is missing before `x`\nhint: write `2*x`");
+    assert_eq!(
+        error("2x").to_string(),
+        "an operator is missing before `x`\nhint: write `2*x`"
+    );
     assert_eq!(error("(").to_string(), "the expression ends too early");
 }
 
 #[test]
 fn any_text_is_answered() {
     // Every short text over an alphabet of awkward pieces: accepted or refused with a span inside it.
-    let pieces = ["x", "2", "e", ".", "(", ")", ",", "-", "^", "<", "=", "!", "|", "if", "min", "²", " "];
+    let pieces = [
+        "x", "2", "e", ".", "(", ")", ",", "-", "^", "<", "=", "!", "|", "if", "min", "²", " ",
+    ];
     let count = pieces.len();
     let (mut accepted, mut refused) = (0, 0);
     for number in 0..count.pow(4) {
-        let text: String = (0..4).map(|place| pieces[number / count.pow(place) % count]).collect();
+        let text: String = (0..4)
+            .map(|place| pieces[number / count.pow(place) % count])
+            .collect();
         match Expression::parse(&text, &Scope::new()) {
             Ok(expression) => {
-                expression.derivative(expression::Variable::X).eval_at(0.5, 0.0, 0.0);
+                expression
+                    .derivative(expression::Variable::X)
+                    .eval_at(0.5, 0.0, 0.0);
                 accepted += 1;
             }
             Err(error) => {
-                assert!(text.get(error.span.clone()).is_some(), "{text:?}: {error:?}");
-                assert!(!error.message.ends_with('.') && !error.message.is_empty(), "{text:?}: {error:?}");
+                assert!(
+                    text.get(error.span.clone()).is_some(),
+                    "{text:?}: {error:?}"
+                );
+                assert!(
+                    !error.message.ends_with('.') && !error.message.is_empty(),
+                    "{text:?}: {error:?}"
+                );
                 refused += 1;
             }
         }

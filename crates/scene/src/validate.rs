@@ -277,11 +277,14 @@ impl Reader<'_> {
                 size,
             } => {
                 let all = |lists: &[At<Vec<At<types::Point>>>]| {
-                    lists.iter().map(|list| self.points(list)).collect()
+                    lists
+                        .iter()
+                        .map(|list| self.points(list))
+                        .collect::<Result<Vec<_>, Fault>>()
                 };
                 Shape::Polygon {
                     outer: self.points(outer)?,
-                    holes: all(holes).and_then(|lists: Vec<_>| Ok(lists))?,
+                    holes: all(holes)?,
                     lines: all(lines)?,
                     size: self.size(size, "domain.polygon.size")?,
                 }

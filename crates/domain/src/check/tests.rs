@@ -34,33 +34,69 @@ fn extreme_scales_pass_and_fail_alike() {
         check(&mesh(&scaled, &[[0, 1, 2], [0, 2, 3]])).unwrap();
         let thin = [[0.0, 0.0], [s, s], [0.5 * s, 0.5 * s], [0.0, s]];
         let found = defect(&thin, &[[0, 1, 2], [0, 1, 3]]);
-        assert!(matches!(found, MeshDefect::ZeroArea { triangle: 0, .. }), "{found:?}");
+        assert!(
+            matches!(found, MeshDefect::ZeroArea { triangle: 0, .. }),
+            "{found:?}"
+        );
     }
     let huge = SQUARE.map(|p| [p[0] * 1e200, p[1]]);
-    assert!(matches!(defect(&huge, &[[0, 1, 2], [0, 2, 3]]), MeshDefect::Extent { .. }));
+    assert!(matches!(
+        defect(&huge, &[[0, 1, 2], [0, 2, 3]]),
+        MeshDefect::Extent { .. }
+    ));
 }
 
 #[test]
 fn broken_lists() {
     assert_eq!(defect(&[], &[]), MeshDefect::NoTriangles);
-    assert!(matches!(defect(&SQUARE, &[[0, 1, 9]]), MeshDefect::UnknownVertex { triangle: 0, vertex: 9 }));
-    assert!(matches!(defect(&SQUARE, &[[0, 1, 2]]), MeshDefect::Unused { vertex: 3, .. }));
+    assert!(matches!(
+        defect(&SQUARE, &[[0, 1, 9]]),
+        MeshDefect::UnknownVertex {
+            triangle: 0,
+            vertex: 9
+        }
+    ));
+    assert!(matches!(
+        defect(&SQUARE, &[[0, 1, 2]]),
+        MeshDefect::Unused { vertex: 3, .. }
+    ));
     let nan = [[0., 0.], [1., f64::NAN], [1., 1.]];
-    assert!(matches!(defect(&nan, &[[0, 1, 2]]), MeshDefect::NotFinite { vertex: 1, .. }));
+    assert!(matches!(
+        defect(&nan, &[[0, 1, 2]]),
+        MeshDefect::NotFinite { vertex: 1, .. }
+    ));
     let mut short = mesh(&SQUARE, &[[0, 1, 2], [0, 2, 3]]);
     short.regions.pop();
-    assert!(matches!(check(&short), Err(MeshDefect::Regions { regions: 1, triangles: 2 })));
+    assert!(matches!(
+        check(&short),
+        Err(MeshDefect::Regions {
+            regions: 1,
+            triangles: 2
+        })
+    ));
 }
 
 #[test]
 fn bad_triangles() {
     let line = [[0., 0.], [1., 1.], [3., 3.]];
-    assert!(matches!(defect(&line, &[[0, 1, 2]]), MeshDefect::ZeroArea { triangle: 0, .. }));
-    assert!(matches!(defect(&[[2., 2.]], &[[0, 0, 0]]), MeshDefect::ZeroArea { .. }));
+    assert!(matches!(
+        defect(&line, &[[0, 1, 2]]),
+        MeshDefect::ZeroArea { triangle: 0, .. }
+    ));
+    assert!(matches!(
+        defect(&[[2., 2.]], &[[0, 0, 0]]),
+        MeshDefect::ZeroArea { .. }
+    ));
     let found = defect(&SQUARE, &[[0, 1, 2], [0, 3, 2]]);
     assert!(matches!(found, MeshDefect::Clockwise { triangle: 1, .. }));
     let found = defect(&SQUARE, &[[0, 1, 2], [0, 2, 3], [2, 0, 1]]);
-    assert!(matches!(found, MeshDefect::Duplicate { triangles: [0, 2], .. }));
+    assert!(matches!(
+        found,
+        MeshDefect::Duplicate {
+            triangles: [0, 2],
+            ..
+        }
+    ));
     assert_eq!(
         found.to_string(),
         "triangle 0 and triangle 2 are the same triangle: `(1, 1)`, `(0, 0)`, `(1, 0)`"
@@ -72,10 +108,28 @@ fn bad_triangles() {
 fn bad_edges() {
     let points = [[0., 0.], [1., 0.], [1., 1.], [0., 1.], [0.5, 2.]];
     let found = defect(&points, &[[0, 1, 2], [0, 2, 3], [0, 2, 4]]);
-    assert!(matches!(found, MeshDefect::SharedEdge { triangles: [0, 1, 2], .. }), "{found:?}");
+    assert!(
+        matches!(
+            found,
+            MeshDefect::SharedEdge {
+                triangles: [0, 1, 2],
+                ..
+            }
+        ),
+        "{found:?}"
+    );
     let points = [[0., 0.], [1., 0.], [0.5, 1.], [0.6, 2.]];
     let found = defect(&points, &[[0, 1, 2], [0, 1, 3]]);
-    assert!(matches!(found, MeshDefect::Fold { triangles: [0, 1], .. }), "{found:?}");
+    assert!(
+        matches!(
+            found,
+            MeshDefect::Fold {
+                triangles: [0, 1],
+                ..
+            }
+        ),
+        "{found:?}"
+    );
 }
 
 #[test]
@@ -88,12 +142,18 @@ fn triangles_that_wind_twice() {
         points.push([r * cos, r * sin]);
     }
     let triangles: Vec<_> = (0..10).map(|k| [0, 1 + k, 1 + (k + 1) % 10]).collect();
-    assert!(matches!(defect(&points, &triangles), MeshDefect::Overlap { at: [0.0, 0.0], .. }));
+    assert!(matches!(
+        defect(&points, &triangles),
+        MeshDefect::Overlap { at: [0.0, 0.0], .. }
+    ));
     // Open at the boundary: six of them overlap as well, four do not.
     let four: Vec<_> = (0..4).map(|k| [0, 1 + k, 2 + k]).collect();
     check(&mesh(&points[..6], &four)).unwrap();
     let six: Vec<_> = (0..6).map(|k| [0, 1 + k, 2 + k]).collect();
-    assert!(matches!(defect(&points[..8], &six), MeshDefect::Overlap { .. }));
+    assert!(matches!(
+        defect(&points[..8], &six),
+        MeshDefect::Overlap { .. }
+    ));
 }
 
 #[test]
@@ -105,7 +165,10 @@ fn hanging_nodes_are_found() {
     let MeshDefect::HangingNode { triangle, at, edge } = &found else {
         panic!("{found:?}")
     };
-    assert_eq!((*triangle, *at, *edge), (0, [1.0, 0.5], [[1.0, 0.0], [1.0, 1.0]]));
+    assert_eq!(
+        (*triangle, *at, *edge),
+        (0, [1.0, 0.5], [[1.0, 0.0], [1.0, 1.0]])
+    );
     assert_eq!(
         found.to_string(),
         "mesh is not conforming: vertex `(1, 0.5)` hangs in the edge `(1, 0)` to `(1, 1)` of triangle 0"
@@ -120,14 +183,24 @@ fn hanging_nodes_off_by_rounding_are_found() {
         let m = [a[0] + (b[0] - a[0]) * 0.3, a[1] + (b[1] - a[1]) * 0.3];
         let points = [a, b, [offset - 1.0, 1.0], [offset + 2.0, 1.0], m];
         let found = defect(&points, &[[0, 1, 2], [0, 3, 4], [4, 3, 1]]);
-        assert!(matches!(found, MeshDefect::HangingNode { triangle: 0, .. }), "{found:?}");
+        assert!(
+            matches!(found, MeshDefect::HangingNode { triangle: 0, .. }),
+            "{found:?}"
+        );
     }
 }
 
 #[test]
 fn a_fine_gap_is_no_hanging_node() {
     // A thin own triangle, and a vertex 1e-6 away from the edge of another component.
-    let points = [[0., 0.], [1., 0.], [0.5, -1e-9], [0.5, 1e-6], [0.4, 1.], [0.3, 1.]];
+    let points = [
+        [0., 0.],
+        [1., 0.],
+        [0.5, -1e-9],
+        [0.5, 1e-6],
+        [0.4, 1.],
+        [0.3, 1.],
+    ];
     check(&mesh(&points, &[[0, 2, 1], [3, 4, 5]])).unwrap();
 }
 
@@ -149,12 +222,24 @@ fn one_hanging_node_among_many_boundary_edges() {
     points.extend([m, [m[0] - 1e-3, m[1]], [m[0] - 1e-3, m[1] - 1e-3]]);
     triangles.push([base, base + 1, base + 2]);
     let found = defect(&points, &triangles);
-    assert!(matches!(found, MeshDefect::HangingNode { triangle: 1234, .. }), "{found:?}");
+    assert!(
+        matches!(found, MeshDefect::HangingNode { triangle: 1234, .. }),
+        "{found:?}"
+    );
 }
 
 #[test]
 fn unmerged_nodes_are_found() {
     let points = [[0., 0.], [1., 0.], [1., 1.], [0., 0.], [1., 1.], [-0., 1.]];
     let found = defect(&points, &[[0, 1, 2], [3, 4, 5]]);
-    assert!(matches!(found, MeshDefect::CoincidentEdges { triangles: [0, 1], .. }), "{found:?}");
+    assert!(
+        matches!(
+            found,
+            MeshDefect::CoincidentEdges {
+                triangles: [0, 1],
+                ..
+            }
+        ),
+        "{found:?}"
+    );
 }

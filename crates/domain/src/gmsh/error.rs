@@ -251,15 +251,25 @@ impl GmshFault {
                 "a relative path is taken from the directory of the scene file"
             }
             Self::Io { .. } => "check the path and its permissions",
-            Self::Version { .. } => "save again with `Mesh.MshFileVersion = 4.1` or `gmsh -format msh41`",
+            Self::Version { .. } => {
+                "save again with `Mesh.MshFileVersion = 4.1` or `gmsh -format msh41`"
+            }
             Self::Empty | Self::NotGmsh => "save the mesh from Gmsh as `.msh`, version 4.1 or 2.2",
-            Self::Partitioned => "save again without partitions (`Mesh.PartitionCreateTopology = 0`, `Unpartition`)",
+            Self::Partitioned => {
+                "save again without partitions (`Mesh.PartitionCreateTopology = 0`, `Unpartition`)"
+            }
             Self::Parametric => "save again with `Mesh.SaveParametric = 0`",
-            Self::Element { .. } => "mesh with first-order triangles: `Mesh.ElementOrder = 1`, `Mesh.RecombineAll = 0`, dimension 2",
+            Self::Element { .. } => {
+                "mesh with first-order triangles: `Mesh.ElementOrder = 1`, `Mesh.RecombineAll = 0`, dimension 2"
+            }
             Self::NotPlanar { .. } => "the domain must lie in a plane z = const",
-            Self::Truncated { .. } | Self::Count { .. } | Self::ByteOrder => "the file is damaged or incomplete; save it again",
+            Self::Truncated { .. } | Self::Count { .. } | Self::ByteOrder => {
+                "the file is damaged or incomplete; save it again"
+            }
             Self::Defect { defect, .. } => return defect.hint(),
-            Self::MissingSection { .. } | Self::SectionEnd { .. } | Self::Parser { .. } => "save the mesh again from Gmsh",
+            Self::MissingSection { .. } | Self::SectionEnd { .. } | Self::Parser { .. } => {
+                "save the mesh again from Gmsh"
+            }
             _ => return None,
         };
         Some(text.to_string())

@@ -50,7 +50,9 @@ impl Soup {
             let name = |t: usize| format!("element {}", self.triangles[t].tag);
             let message = defect.describe(&name);
             Flaw {
-                place: defect.triangle().map_or(Place::File, |t| place(self.triangles[t].at)),
+                place: defect
+                    .triangle()
+                    .map_or(Place::File, |t| place(self.triangles[t].at)),
                 fault: GmshFault::Defect { defect, message },
             }
         };
@@ -64,11 +66,17 @@ impl Soup {
         let mut index = HashMap::with_capacity(self.nodes.len());
         for (i, node) in self.nodes.iter().enumerate() {
             if index.insert(node.tag, i as u32).is_some() {
-                return Err(flaw(node.tag_at, GmshFault::DuplicateNode { node: node.tag }));
+                return Err(flaw(
+                    node.tag_at,
+                    GmshFault::DuplicateNode { node: node.tag },
+                ));
             }
             if !node.position.iter().all(|x| x.is_finite()) {
                 let (node, value) = (node.tag, node.position);
-                return Err(flaw(self.nodes[i].at, GmshFault::NodeNotFinite { node, value }));
+                return Err(flaw(
+                    self.nodes[i].at,
+                    GmshFault::NodeNotFinite { node, value },
+                ));
             }
         }
 
@@ -97,7 +105,10 @@ impl Soup {
         for corner in triangles.iter_mut().flatten() {
             *corner = number[*corner as usize];
         }
-        let points: Vec<[f64; 2]> = kept.iter().map(|n| [n.position[0], n.position[1]]).collect();
+        let points: Vec<[f64; 2]> = kept
+            .iter()
+            .map(|n| [n.position[0], n.position[1]])
+            .collect();
         flat(&kept).map_err(|(at, fault)| flaw(at, fault))?;
         if let Ok(frame) = Frame::new(&points) {
             for corners in &mut triangles {

@@ -24,7 +24,9 @@ pub(crate) fn read(scan: &mut Scanner<'_>) -> Scan<Soup> {
                 nodes = true;
             }
             "Elements" if elements => {
-                return Err(scan.flaw(GmshFault::RepeatedSection { section: "Elements" }));
+                return Err(scan.flaw(GmshFault::RepeatedSection {
+                    section: "Elements",
+                }));
             }
             "Elements" => {
                 read_elements(scan, &mut soup)?;
@@ -84,7 +86,9 @@ fn read_elements(scan: &mut Scanner<'_>, soup: &mut Soup) -> Scan<()> {
                 let kind = read_kind(scan)?;
                 let block = scan.int("a number of elements")?;
                 let tags = read_tag_count(scan)?;
-                let Some(block) = usize::try_from(block).ok().filter(|&n| n > 0 && n <= count - done)
+                let Some(block) = usize::try_from(block)
+                    .ok()
+                    .filter(|&n| n > 0 && n <= count - done)
                 else {
                     let (what, found) = ("a number of elements", block.to_string());
                     return Err(scan.flaw(GmshFault::Number { what, found }));

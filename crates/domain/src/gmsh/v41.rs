@@ -40,9 +40,13 @@ pub(crate) fn read(scan: &mut Scanner<'_>, bytes: &[u8]) -> Scan<Soup> {
     let survey = survey(scan)?;
     let file = mshio::parse_msh_bytes(bytes).map_err(|error| {
         let kind = error.first_msh_error();
-        let context = error.filter_msh_errors().find_map(|(_, kind)| kind.context());
+        let context = error
+            .filter_msh_errors()
+            .find_map(|(_, kind)| kind.context());
         let what = match (kind, context) {
-            (Some(kind), Some(context)) if kind.context().is_none() => format!("{kind} ({context})"),
+            (Some(kind), Some(context)) if kind.context().is_none() => {
+                format!("{kind} ({context})")
+            }
             (Some(kind), _) => kind.to_string(),
             (None, _) => "syntax error".to_string(),
         };

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 
 use super::outline::{Outline, Segment, conflict, find_conflict};
 use crate::error::PartEdge;
-use crate::geometry::{Point, cross, distance, twice_area};
+use crate::geometry::{Point, cross, distance, orient, twice_area};
 use crate::{DomainError, Part};
 
 /// A vertex of a line this close to a vertex or edge, in a domain of extent one to two, lies on it.
@@ -24,16 +24,23 @@ pub(super) struct Graph {
     pub area: f64,
     /// Whether some edges are not on the outline.
     pub has_lines: bool,
+    /// Whether the outer polygon is convex; cutting may have bent it by rounding.
+    pub convex: bool,
 }
 
 impl Graph {
     pub fn new(outline: &Outline) -> Result<Self, DomainError> {
         let mut graph = Self {
-            points: outline.rings.iter().flat_map(|r| r.points.clone()).collect(),
+            points: outline
+                .rings
+                .iter()
+                .flat_map(|r| r.points.clone())
+                .collect(),
             given: outline.rings.iter().flat_map(|r| r.given.clone()).collect(),
             edges: Vec::new(),
             area: 0.0,
             has_lines: false,
+            convex: true,
         };
         let mut segments = outline.ring_segments();
         let rim = segments.len();
@@ -44,7 +51,7 @@ impl Graph {
             .enumerate()
             .map(|(k, s)| graph.cut(s, if k < rim { on_rings } else { 0 }))
             .collect();
-        graph.area = graph.measure(outline, &cut);
+        graph.measure(outline, &cut);
 
         let mut known = HashSet::new();
         let mut pieces = Vec::new();
@@ -143,9 +150,8 @@ impl Graph {
         path
     }
 
-    /// Area of the domain, its outline cut at the vertices of lines on it.
-    fn measure(&self, outline: &Outline, cut: &[Vec<usize>]) -> f64 {
-        let mut area = 0.0;
+    /// Area and convexity of the domain, its outline cut at the vertices of lines on it.
+    fn measure(&mut self, outline: &Outline, cut: &[Vec<usize>]) {
         let mut first = 0;
         for ring in &outline.rings {
             let last = first + ring.points.len();
@@ -154,11 +160,18 @@ impl Graph {
                 .flat_map(|path| &path[..path.len() - 1])
                 .map(|&v| self.points[v])
                 .collect();
-            let part = 0.5 * twice_area(&corners).abs();
-            area += if ring.part == Part::Outer { part } else { -part };
+            let twice = twice_area(&corners);
+            if ring.part == Part::Outer {
+                self.area += 0.5 * twice.abs();
+                let n = corners.len();
+                let turn =
+                    |k: usize| orient(corners[k], corners[(k + 1) % n], corners[(k + 2) % n]);
+                self.convex = (0..n).all(|k| turn(k) * twice.signum() >= 0.0);
+            } else {
+                self.area -= 0.5 * twice.abs();
+            }
             first = last;
         }
-        area
     }
 }
 

@@ -2,11 +2,12 @@
 //!
 //! Which triangles belong to the domain is decided here, from the outline: spade's own notion of
 //! inside counts the constraint edges crossed on the way in, and lines would count as well. For
-//! the same reason its way to leave the outside unrefined serves only a domain without lines.
+//! the same reason its way to leave the outside unrefined serves only a domain without lines. With
+//! lines the outside is refined too and then dropped; four vertices far around keep it free of the
+//! flat triangles that an almost straight outline and its convex hull would enclose.
 
 use spade::{
-    AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters,
-    Triangulation,
+    AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation,
 };
 
 use super::lines::Graph;
@@ -21,12 +22,15 @@ const DETAIL_VERTICES: usize = 1_000_000;
 /// The triangulation may have this many times the triangles of the ideal mesh.
 const SURPLUS: f64 = 10.0;
 
+/// Distance of the four outer vertices from the domain, whose extent is one to two.
+const MARGIN: f64 = 0.5;
+
 type Cdt = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
 /// A mesh of the domain at order one.
 #[derive(Clone, Debug)]
 pub(super) struct Domain {
-    /// The vertices of the graph, then new ones; some may be unused.
+    /// The vertices of the graph, then others; some may be unused.
     pub points: Vec<Point>,
     pub triangles: Vec<[u32; 3]>,
 }
@@ -45,12 +49,15 @@ pub(super) fn triangulate(
             size,
         });
     }
-    let mut cdt = load(graph)?;
-    let refined_area = if graph.has_lines {
-        bounds(graph.points.iter().copied())
-            .map_or(graph.area, |[low, high]| (high[0] - low[0]) * (high[1] - low[1]))
+    let frame = if graph.has_lines && !graph.convex {
+        around(graph)
     } else {
-        graph.area
+        Vec::new()
+    };
+    let mut cdt = load(graph, &frame)?;
+    let refined_area = match frame.as_slice() {
+        [low, _, high, _] => (high[0] - low[0]) * (high[1] - low[1]),
+        _ => graph.area,
     };
     // Without limit where the size is larger than the domain by far.
     let surplus = (SURPLUS * refined_area / ideal).min(SURPLUS * MAX_TRIANGLES) as usize;
@@ -81,15 +88,28 @@ fn failed(what: impl ToString) -> DomainError {
     DomainError::Generator { what }
 }
 
-fn load(graph: &Graph) -> Result<Cdt, DomainError> {
-    let points = graph.points.iter().map(|p| Point2::new(p[0], p[1]));
+/// Four vertices around the domain.
+fn around(graph: &Graph) -> Vec<Point> {
+    let Some([low, high]) = bounds(graph.points.iter().copied()) else {
+        return Vec::new();
+    };
+    let (low, high) = (low.map(|x| x - MARGIN), high.map(|x| x + MARGIN));
+    vec![low, [high[0], low[1]], high, [low[0], high[1]]]
+}
+
+fn load(graph: &Graph, frame: &[Point]) -> Result<Cdt, DomainError> {
+    let points = graph
+        .points
+        .iter()
+        .chain(frame)
+        .map(|p| Point2::new(p[0], p[1]));
     let mut conflicts = 0;
     let cdt = Cdt::try_bulk_load_cdt(points.collect(), graph.edges.clone(), |_| conflicts += 1)
         .map_err(failed)?;
     if conflicts > 0 {
         return Err(failed(format!("`{conflicts}` edges are in conflict")));
     }
-    if cdt.num_vertices() != graph.points.len() {
+    if cdt.num_vertices() != graph.points.len() + frame.len() {
         return Err(failed("vertices were merged"));
     }
     Ok(cdt)
@@ -152,7 +172,9 @@ fn verify(graph: &Graph, cdt: &Cdt, domain: &Domain) -> Result<(), DomainError> 
     }
     let (given, found) = (given.value(), found.value());
     if (given - found).abs() > 1e-12 * given {
-        return Err(failed(format!("edges of total length `{given}` became `{found}`")));
+        return Err(failed(format!(
+            "edges of total length `{given}` became `{found}`"
+        )));
     }
     let mut area = Sum::default();
     for triangle in &domain.triangles {

@@ -26,8 +26,9 @@ use crate::{DomainError, RawMesh};
 /// except in common vertices. A vertex of a line within `1e-10` of the domain's extent from a vertex
 /// or an edge is taken to lie on it.
 ///
-/// With lines, the mesh is refined in the whole convex hull before the outside is dropped: the
-/// outside of a narrow notch then makes the mesh finer around it than it need be.
+/// With lines in a domain that is not convex or has holes, the outside and the holes are refined as
+/// well before they are dropped: a narrow notch or hole then makes the mesh finer around it than it
+/// need be.
 pub fn polygon(
     outer: &[Point],
     holes: &[Vec<Point>],

@@ -72,7 +72,11 @@ impl Outline {
         for (k, line) in lines.iter().enumerate() {
             chains.push(given(Part::Line(k + 1), line)?);
         }
-        let all: Vec<Point> = rings.iter().chain(&chains).flat_map(|c| c.given.clone()).collect();
+        let all: Vec<Point> = rings
+            .iter()
+            .chain(&chains)
+            .flat_map(|c| c.given.clone())
+            .collect();
         let frame = Frame::new(&all).map_err(|extent| DomainError::Extent { extent })?;
         for chain in rings.iter_mut().chain(&mut chains) {
             chain.points = chain.given.iter().map(|&p| frame.enter(p)).collect();
@@ -122,7 +126,10 @@ impl Outline {
 
     fn holes_inside(&self) -> Result<(), DomainError> {
         let holes = &self.rings[1..];
-        let boxes: Vec<_> = holes.iter().map(|h| bounds(h.points.iter().copied())).collect();
+        let boxes: Vec<_> = holes
+            .iter()
+            .map(|h| bounds(h.points.iter().copied()))
+            .collect();
         for (k, hole) in holes.iter().enumerate() {
             let at = hole.points[0];
             if !inside(&self.rings[0].points, at) {
@@ -217,7 +224,12 @@ fn has_area(ring: &Chain) -> Result<(), DomainError> {
 fn no_repeats(ring: &Chain) -> Result<(), DomainError> {
     let mut order: Vec<usize> = (0..ring.points.len()).collect();
     let key = |k: usize| ring.points[k];
-    order.sort_by(|&i, &j| key(i).partial_cmp(&key(j)).unwrap_or(std::cmp::Ordering::Equal).then(i.cmp(&j)));
+    order.sort_by(|&i, &j| {
+        key(i)
+            .partial_cmp(&key(j))
+            .unwrap_or(std::cmp::Ordering::Equal)
+            .then(i.cmp(&j))
+    });
     match order.windows(2).find(|pair| key(pair[0]) == key(pair[1])) {
         None => Ok(()),
         Some(pair) => Err(DomainError::RepeatedVertex {

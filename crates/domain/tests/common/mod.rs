@@ -100,12 +100,21 @@ pub const PLAIN: Style = Style {
 
 impl Style {
     pub fn tag(&self, mesh: &RawMesh, i: usize) -> u64 {
-        let i = if self.reverse { mesh.points.len() - 1 - i } else { i };
+        let i = if self.reverse {
+            mesh.points.len() - 1 - i
+        } else {
+            i
+        };
         self.offset + self.stride * i as u64
     }
     fn nodes(&self, mesh: &RawMesh) -> Vec<(u64, [f64; 3])> {
         let mut nodes: Vec<_> = (0..mesh.points.len())
-            .map(|i| (self.tag(mesh, i), [mesh.points[i][0], mesh.points[i][1], self.z]))
+            .map(|i| {
+                (
+                    self.tag(mesh, i),
+                    [mesh.points[i][0], mesh.points[i][1], self.z],
+                )
+            })
             .collect();
         if self.clutter {
             let tag = 1 + nodes.iter().map(|n| n.0).max().unwrap_or(0);
@@ -114,7 +123,10 @@ impl Style {
         nodes
     }
     fn corners(&self, mesh: &RawMesh, t: usize) -> Vec<u64> {
-        mesh.triangles[t].iter().map(|&v| self.tag(mesh, v as usize)).collect()
+        mesh.triangles[t]
+            .iter()
+            .map(|&v| self.tag(mesh, v as usize))
+            .collect()
     }
 }
 
@@ -130,7 +142,10 @@ pub fn write22(mesh: &RawMesh, format: Format, style: Style) -> Vec<u8> {
     }
     let clutter = if style.clutter { 3 } else { 0 };
     out.text(if format == Format::Ascii { "" } else { "\n" });
-    out.text(&format!("$EndNodes\n$Elements\n{}\n", mesh.triangles.len() + clutter));
+    out.text(&format!(
+        "$EndNodes\n$Elements\n{}\n",
+        mesh.triangles.len() + clutter
+    ));
     let first = nodes[0].0 as i32;
     let mut tag = 0;
     // In binary, a block a element keeps the writer simple and the headers frequent.

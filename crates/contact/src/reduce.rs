@@ -1,0 +1,163 @@
+//! The smallest model of a problem, and the way back to the two displacements.
+//!
+//! With tensions t_1 M, t_2 M of one matrix M and theta_i = t_i/(t_1 + t_2), the mean s = theta_1 u1 + theta_2 u2 solves one linear problem,
+//! `M s = (F_1 + F_2)/(t_1 + t_2)`, and the gap w one scalar obstacle problem, `M w - y = F_1/t_1 - F_2/t_2`, `w >= 0`, `y >= 0`. Then
+//! `u1 = s + theta_2 w`, `u2 = s - theta_1 w`, `z = y t_1 t_2/(t_1 + t_2)`. M is K for constant tensions and A_1 for variable tensions in a constant
+//! ratio. No quotient in here overflows before its value does.
+
+use fem_core::SymmetricMatrix;
+
+use crate::interior::{Interior, Role};
+use crate::problem::{DiscreteProblem, Tensions};
+use crate::solution::Reduction;
+use crate::start::Start;
+use crate::system::{Fields, System};
+
+/// Loads that cancel to this many units of rounding cancel exactly: what is left of them is noise without a sign.
+const CANCELLED: f64 = 8.0 * f64::EPSILON;
+
+/// Tensions in a constant ratio: the two displacements decouple into mean and gap.
+pub(crate) struct Proportional<'a> {
+    problem: &'a DiscreteProblem,
+    /// M.
+    pub matrix: &'a SymmetricMatrix,
+    /// What M stands for.
+    pub role: Role,
+    /// Name of the model.
+    pub reduction: Reduction,
+    tension: [f64; 2],
+}
+
+impl<'a> Proportional<'a> {
+    /// The reduced model, where the tensions allow one.
+    pub fn of(problem: &'a DiscreteProblem) -> Option<Self> {
+        let (matrix, role, reduction, tension) = match problem.tensions {
+            Tensions::Constant(m1, m2) => (
+                &problem.laplacian,
+                Role::Laplacian,
+                Reduction::ConstantTensions,
+                [m1, m2],
+            ),
+            Tensions::Ratio(c) => (
+                &problem.stiffness[0],
+                Role::Stiffness,
+                Reduction::ConstantRatio,
+                [1.0, c],
+            ),
+            Tensions::General => return None,
+        };
+        Some(Proportional {
+            problem,
+            matrix,
+            role,
+            reduction,
+            tension,
+        })
+    }
+
+    /// theta_1, theta_2: the share of either membrane in the tension.
+    fn shares(&self) -> [f64; 2] {
+        let [t1, t2] = self.tension;
+        [1.0 / (1.0 + t2 / t1), 1.0 / (1.0 + t1 / t2)]
+    }
+
+    /// The obstacle problem of the gap.
+    pub fn system<'s>(&self, interior: &'s Interior) -> System<'s>
+    where
+        'a: 's,
+    {
+        let [t1, t2] = self.tension;
+        let [f1, f2] = [0, 1].map(|i| &self.problem.loads[i].nodal);
+        let mut load = vec![0.0; f1.len()];
+        let mut scale = load.clone();
+        for j in interior.iter() {
+            let (a, b) = (f1[j] / t1, f2[j] / t2);
+            scale[j] = a.abs() + b.abs();
+            let difference = a - b;
+            if difference.abs() > CANCELLED * scale[j] {
+                load[j] = difference;
+            }
+        }
+        System {
+            matrices: vec![self.matrix],
+            loads: vec![load],
+            load_scale: vec![scale],
+            interior,
+        }
+    }
+
+    /// The gap to start from: boundary values of the problem, else the start's or zero.
+    pub fn initial_gap(&self, interior: &Interior, start: Option<&Start>) -> Fields {
+        let [g1, g2] = &self.problem.heights;
+        let mut gap: Vec<f64> = g1.iter().zip(g2).map(|(a, b)| a - b).collect();
+        for j in interior.iter() {
+            gap[j] = start.map_or(0.0, |s| {
+                (s.displacement[0][j] - s.displacement[1][j]).max(0.0)
+            });
+        }
+        vec![gap]
+    }
+
+    /// The mean to start from: boundary values of the problem, else the start's or zero.
+    pub fn initial_mean(&self, interior: &Interior, start: Option<&Start>) -> Vec<f64> {
+        let [s1, s2] = self.shares();
+        let mean = |u: &[Vec<f64>; 2], j: usize| s1 * u[0][j] + s2 * u[1][j];
+        let mut values: Vec<f64> = (0..self.problem.order())
+            .map(|j| mean(&self.problem.heights, j))
+            .collect();
+        for j in interior.iter() {
+            values[j] = start.map_or(0.0, |s| mean(&s.displacement, j));
+        }
+        values
+    }
+
+    /// The load of the mean, (F_1 + F_2)/(t_1 + t_2).
+    pub fn mean_load(&self, j: usize) -> f64 {
+        let [t1, t2] = self.tension;
+        let (large, small) = (t1.max(t2), t1.min(t2));
+        let sum = self.problem.loads[0].nodal[j] + self.problem.loads[1].nodal[j];
+        sum / large / (1.0 + small / large)
+    }
+
+    /// The displacements from mean and gap; the heights on the boundary.
+    ///
+    /// Rounding is monotone, so a gap that is not negative stays so, and a closed one closed.
+    pub fn displacements(&self, interior: &Interior, mean: &[f64], gap: &[f64]) -> [Vec<f64>; 2] {
+        let [s1, s2] = self.shares();
+        let mut u = self.problem.heights.clone();
+        for j in interior.iter() {
+            u[0][j] = mean[j] + s2 * gap[j];
+            u[1][j] = mean[j] - s1 * gap[j];
+        }
+        u
+    }
+}
+
+/// The two-field problem.
+pub(crate) fn pair_system<'a>(problem: &'a DiscreteProblem, interior: &'a Interior) -> System<'a> {
+    let loads: Vec<Vec<f64>> = problem.loads.iter().map(|l| l.nodal.clone()).collect();
+    System {
+        matrices: problem.stiffness.iter().collect(),
+        load_scale: loads
+            .iter()
+            .map(|l| l.iter().map(|f| f.abs()).collect())
+            .collect(),
+        loads,
+        interior,
+    }
+}
+
+/// The displacements to start from: boundary values of the problem, else the start's or zero.
+pub(crate) fn initial_pair(
+    problem: &DiscreteProblem,
+    interior: &Interior,
+    start: Option<&Start>,
+) -> Fields {
+    let mut fields = problem.heights.to_vec();
+    for (i, field) in fields.iter_mut().enumerate() {
+        for j in interior.iter() {
+            field[j] = start.map_or(0.0, |s| s.displacement[i][j]);
+        }
+    }
+    fields
+}

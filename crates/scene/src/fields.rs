@@ -1,0 +1,209 @@
+//! Expressions as fields: scaled points in, scaled values out.
+
+use expression::Expression;
+use fem_core::scale::times_power_of_two;
+use fem_core::{Field, FieldError, Samples};
+
+/// Points evaluated at once.
+const BLOCK: usize = 256;
+
+/// An expression of the physical coordinates, read at scaled points.
+#[derive(Clone, Debug)]
+pub(crate) struct ExpressionField {
+    name: String,
+    expression: Expression,
+    /// 2^a, a the exponent of length.
+    length: f64,
+    /// Two factors whose product is 2^-e, e the exponent of the values: 2^-e alone may not be a number.
+    factors: [f64; 2],
+    positive: bool,
+}
+
+impl ExpressionField {
+    /// The field `expression`, which errors call `name`, with points in units of 2^length and values in units of 2^value.
+    pub fn new(name: &str, expression: &Expression, length: i32, value: i32) -> Self {
+        let half = -value / 2;
+        ExpressionField {
+            name: name.to_owned(),
+            expression: expression.clone(),
+            length: times_power_of_two(1.0, length),
+            factors: [half, -value - half].map(|e| times_power_of_two(1.0, e)),
+            positive: false,
+        }
+    }
+
+    /// The same field, for which a value that is not positive is an error.
+    pub fn positive(self) -> Self {
+        ExpressionField {
+            positive: true,
+            ..self
+        }
+    }
+
+    fn scaled(&self, value: f64) -> f64 {
+        value * self.factors[0] * self.factors[1]
+    }
+
+    fn refuse(&self, value: f64, at: Samples<'_>, k: usize) -> FieldError {
+        FieldError {
+            name: self.name.clone(),
+            value,
+            x: at.x[k] * self.length,
+            y: at.y[k] * self.length,
+        }
+    }
+}
+
+impl Field for ExpressionField {
+    fn sample(&self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
+        let mut x = [0.0; BLOCK];
+        let mut y = [0.0; BLOCK];
+        for start in (0..at.len()).step_by(BLOCK) {
+            let end = at.len().min(start + BLOCK);
+            let n = end - start;
+            for k in 0..n {
+                x[k] = at.x[start + k] * self.length;
+                y[k] = at.y[start + k] * self.length;
+            }
+            let region = at.region.get(start..end).unwrap_or_default();
+            let out = &mut out[start..end];
+            self.expression.eval(&x[..n], &y[..n], region, out);
+            for (k, value) in out.iter_mut().enumerate() {
+                let scaled = self.scaled(*value);
+                if !scaled.is_finite() || (self.positive && scaled <= 0.0) {
+                    return Err(self.refuse(*value, at, start + k));
+                }
+                *value = scaled;
+            }
+        }
+        Ok(())
+    }
+
+    fn constant(&self) -> Option<f64> {
+        let value = self.scaled(self.expression.constant()?);
+        (value.is_finite() && !(self.positive && value <= 0.0)).then_some(value)
+    }
+}
+
+/// How far, relative to the larger one, g2 may lie above g1 and be taken for equal: expressions that mean the same
+/// differ by rounding.
+const HEIGHT_SLACK: f64 = 1e-13;
+
+/// The height of the lower membrane, which is never above that of the upper one.
+#[derive(Clone, Debug)]
+pub(crate) struct LowerHeight {
+    pub lower: ExpressionField,
+    pub upper: ExpressionField,
+}
+
+impl LowerHeight {
+    /// The height to use, or how far the lower one is above the upper one.
+    fn below(lower: f64, upper: f64) -> Result<f64, f64> {
+        if lower <= upper {
+            Ok(lower)
+        } else if lower - upper <= HEIGHT_SLACK * lower.abs().max(upper.abs()) {
+            Ok(upper)
+        } else {
+            Err(lower - upper)
+        }
+    }
+}
+
+impl Field for LowerHeight {
+    fn sample(&self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
+        self.lower.sample(at, out)?;
+        let mut upper = vec![0.0; at.len()];
+        self.upper.sample(at, &mut upper)?;
+        for (k, (lower, upper)) in out.iter_mut().zip(upper).enumerate() {
+            *lower = Self::below(*lower, upper).map_err(|excess| FieldError {
+                name: "lower.boundary - upper.boundary".into(),
+                value: excess / self.lower.factors[0] / self.lower.factors[1],
+                ..self.lower.refuse(0.0, at, k)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn constant(&self) -> Option<f64> {
+        Self::below(self.lower.constant()?, self.upper.constant()?).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use expression::Scope;
+
+    fn field(text: &str, length: i32, value: i32) -> ExpressionField {
+        let expression = Expression::parse(text, &Scope::new()).unwrap();
+        ExpressionField::new("f", &expression, length, value)
+    }
+
+    fn sample(field: &dyn Field, x: &[f64], y: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let region = vec![3.0; x.len()];
+        let mut out = vec![0.0; x.len()];
+        let at = Samples {
+            x,
+            y,
+            region: &region,
+        };
+        field.sample(at, &mut out)?;
+        Ok(out)
+    }
+
+    #[test]
+    fn points_and_values_are_scaled() {
+        let f = field("x + 10*y + 100*region", 2, 3);
+        assert_eq!(sample(&f, &[1.0, 2.0], &[0.5, 0.25]).unwrap(), [40.5, 39.75 - 0.5]);
+        assert_eq!(field("12", 5, 2).constant(), Some(3.0));
+        assert_eq!(f.constant(), None);
+    }
+
+    #[test]
+    fn exponents_beyond_the_range_of_a_double() {
+        let f = field("1e-300", 0, -1900);
+        let expected = times_power_of_two(1e-300, 1900);
+        assert!(expected.is_finite() && expected > 0.0);
+        assert_eq!(sample(&f, &[0.0], &[0.0]).unwrap(), [expected]);
+        assert_eq!(field("1e300", 0, 1900).constant(), Some(times_power_of_two(1e300, -1900)));
+        assert!(sample(&field("1e300", 0, -1900), &[0.0], &[0.0]).is_err());
+        assert_eq!(field("1e300", 0, -1900).constant(), None);
+    }
+
+    #[test]
+    fn many_points_give_what_single_ones_do() {
+        let f = field("sin(x)*y + if(x > 0.5, x^2, -y)", -1, 1);
+        let x: Vec<f64> = (0..1000).map(|k| k as f64 / 700.0).collect();
+        let y: Vec<f64> = (0..1000).map(|k| 1.0 - k as f64 / 300.0).collect();
+        let all = sample(&f, &x, &y).unwrap();
+        for k in 0..1000 {
+            assert_eq!(all[k], sample(&f, &x[k..=k], &y[k..=k]).unwrap()[0]);
+        }
+    }
+
+    #[test]
+    fn a_value_that_is_not_finite_is_named_with_its_place() {
+        let x: Vec<f64> = (0..300).map(|k| (280 - k) as f64).collect();
+        let error = sample(&field("1/x", 1, 0), &x, &vec![0.25; 300]).unwrap_err();
+        assert_eq!((error.x, error.y), (0.0, 0.5));
+        assert!(error.value.is_infinite() && error.name == "f");
+        let error = sample(&field("x - 3", 1, 4).positive(), &[2.0, 1.0], &[0.0; 2]).unwrap_err();
+        assert_eq!((error.x, error.value), (2.0, -1.0));
+    }
+
+    #[test]
+    fn heights_that_differ_by_rounding_are_equal() {
+        let height = |lower: &str, upper: &str| LowerHeight {
+            lower: field(lower, 0, 2),
+            upper: field(upper, 0, 2),
+        };
+        let rounded = height("0.3*x", "0.1*x + 0.2*x");
+        assert_eq!(sample(&rounded, &[1.0], &[0.0]).unwrap(), [0.3 / 4.0]);
+        let rounded = height("0.1*x + 0.2*x", "0.3*x");
+        assert_eq!(sample(&rounded, &[1.0], &[0.0]).unwrap(), [0.3 / 4.0]);
+        let error = sample(&height("1", "1 - x"), &[0.0, 0.5], &[0.0; 2]).unwrap_err();
+        assert_eq!((error.x, error.value), (0.5, 0.5));
+        assert_eq!(height("1", "2").constant(), Some(0.25));
+        assert_eq!(height("2", "1").constant(), None);
+    }
+}

@@ -1,0 +1,8 @@
+//! The numbers: reference values, rates, efficiency of the indicators, agreement of the solvers, covariance under scaling.
+
+mod agreement;
+mod cases;
+mod covariance;
+mod efficiency;
+mod rates;
+mod reference;

@@ -1,0 +1,6 @@
+//! The program as a user meets it: every scene of `configs/`, the command line, and the files as the real VTK reads them.
+
+mod command_line;
+mod configs;
+mod run;
+mod vtk;
