@@ -8,9 +8,9 @@
 ARRAY is the name of an array, or `point:NAME`, `cell:NAME`, `field:NAME` where a name alone would not do; `Points`,
 `connectivity`, `offsets` and `types` are the mesh itself.
 
-A .pvd is followed by the objects of the files that it lists. The exit code is 1 when VTK reports an error or a warning, an
-array does not have one tuple a point or cell, or a file of an index is missing; the reason is on standard error. Needs
-Python 3.9 and the package `vtk`.
+A .pvd is followed by the objects of the files that it lists. The exit code is 1 when VTK reports an error or a
+warning, an array does not have one tuple a point or cell, or a file of an index is missing; the reason is on standard
+error. Needs Python 3.9 and the package `vtk`.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import struct
 import sys
 import xml.etree.ElementTree as ElementTree
 
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
+from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
 
 TRIANGLE = 5
@@ -40,6 +40,7 @@ def read(path):
         raise Failure(f"`{path}`: not .vtu, .vtp or .pvd")
     if not os.path.isfile(path):
         raise Failure(f"`{path}`: no such file")
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     messages = vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(messages)
     reader = readers[kind]()
@@ -150,33 +151,35 @@ def series(path):
 
 
 def find(path, wanted):
-    """The array that a name means."""
+    """The type and the values of the array that a name means."""
     data = read(path)
-    if wanted == "Points":
-        return data.GetPoints().GetData()
-    if wanted in ("connectivity", "offsets", "types"):
+    if wanted == "types":
+        return "uint8", [data.GetCellType(i) for i in range(data.GetNumberOfCells())]
+    if wanted in ("connectivity", "offsets"):
         cells = data.GetCells() if path.endswith(".vtu") else data.GetLines()
-        if wanted == "connectivity":
-            return cells.GetConnectivityArray()
-        return cells.GetOffsetsArray() if wanted == "offsets" else data.GetCellTypesArray()
-    places = {"point": data.GetPointData(), "cell": data.GetCellData(), "field": data.GetFieldData()}
-    place, _, name = wanted.rpartition(":")
-    searched = [places[place]] if place in places else places.values()
-    found = [place.GetArray(name) for place in searched if place.HasArray(name)]
-    if len(found) != 1:
-        raise Failure(f"`{path}`: {len(found)} arrays of the name `{wanted}`")
-    return found[0]
+        array = cells.GetConnectivityArray() if wanted == "connectivity" else cells.GetOffsetsArray()
+    elif wanted == "Points":
+        array = data.GetPoints().GetData()
+    else:
+        places = {"point": data.GetPointData(), "cell": data.GetCellData(), "field": data.GetFieldData()}
+        place, _, name = wanted.rpartition(":")
+        searched = [places[place]] if place in places else places.values()
+        found = [place.GetArray(name) for place in searched if place.HasArray(name)]
+        if len(found) != 1:
+            raise Failure(f"`{path}`: {len(found)} arrays of the name `{wanted}`")
+        array = found[0]
+    return kind(array), values(array)
 
 
 def dump(path, wanted, bits):
     """Every value on its line."""
-    array = find(path, wanted)
-    if not kind(array).startswith("float"):
-        lines = map(str, values(array))
+    type_name, data = find(path, wanted)
+    if not type_name.startswith("float"):
+        lines = map(str, data)
     elif bits:
-        lines = (struct.pack(">d", value).hex() for value in values(array))
+        lines = (struct.pack(">d", value).hex() for value in data)
     else:
-        lines = (value.hex() for value in values(array))
+        lines = (value.hex() for value in data)
     sys.stdout.writelines(line + "\n" for line in lines)
 
 

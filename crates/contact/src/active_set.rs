@@ -1,9 +1,14 @@
-//! The primal-dual active set method: solve on a contact set, let go what is pulled, attach what has crossed, until nothing changes.
+//! The active set method: solve on a contact set, let go what is pulled, attach what has crossed, until nothing changes.
 //!
-//! Equivalent to a semismooth Newton method (Hintermueller, Ito, Kunisch 2002). It ends in finitely many steps
-//! for M-matrices; on other meshes nothing proves it, so a set that comes back, or a long time without progress, hands over to
-//! [`crate::monotone`]. From the contact set of a coarser mesh two to four steps are usual; from nothing the count
-//! grows like 1/h, since a set that is too large shrinks by one layer of vertices a step.
+//! At heart the primal-dual method (Hintermueller, Ito, Kunisch 2002): each step solves the linear problem with the gap closed on the contact
+//! set, and ends when no multiplier there is negative and no gap elsewhere. The plain update, release and attach what violates, lets a set that
+//! is too large shrink by one layer of vertices a step, so that from nothing it needs a number of steps like 1/h. Here the next set is read off
+//! after a few projected Gauss-Seidel sweeps from the (projected) iterate, which cost a few per cent of a factorisation and see several layers
+//! at once. Measured with four sweeps: 6 solves instead of 19 from nothing at 66 049 vertices, 2 or 3 instead of 4 or 5
+//! from the contact set of a coarser mesh, at any size.
+//!
+//! The fields after a solve depend on the set alone, so a set that comes back proves a cycle. Then, and after a long time without
+//! progress, [`crate::monotone`] takes over, which cannot cycle.
 
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -17,8 +22,25 @@ use crate::system::{Fields, System, Violations};
 /// Violations up to this size, relative to the largest displacement, are rounding: the gap is closed there and the set stays.
 pub(crate) const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
+/// Violations below this size may be errors of the linear solve and are looked at again after refinement.
+const SUSPECT: f64 = 1e-10;
+
 /// Steps without a new least number of changes before the method counts as stuck.
 const PATIENCE: usize = 25;
+
+/// Projected Gauss-Seidel sweeps, forwards and backwards, between two solves.
+pub(crate) const SWEEPS: usize = 4;
+
+/// Where the method begins.
+#[derive(Clone, Debug)]
+pub(crate) struct Guess {
+    /// The fields, boundary values in place.
+    pub fields: Fields,
+    /// The contact set.
+    pub contact: Vec<bool>,
+    /// Whether the fields are worth reading the set off after relaxation; else the first solve takes `contact` as it is.
+    pub warm: bool,
+}
 
 /// What the method ends with.
 #[derive(Clone, Debug)]
@@ -35,23 +57,24 @@ pub(crate) struct Outcome {
     pub status: Status,
 }
 
-/// Solves the inequality from a guess of the fields (boundary values in place) and of the contact set.
+/// Solves the inequality.
 pub(crate) fn solve(
     system: &System,
     solver: &mut FreeSolver,
-    mut fields: Fields,
-    mut contact: Vec<bool>,
+    guess: Guess,
 ) -> Result<Outcome, SolveError> {
+    let Guess {
+        mut fields,
+        mut contact,
+        warm,
+    } = guess;
+    if warm {
+        for j in system.interior.iter().filter(|&j| contact[j]) {
+            system.close(&mut fields, j);
+        }
+        system.relaxed_contact(&mut fields, &mut contact, SWEEPS);
+    }
     let limit = 50 + 2 * (system.interior.len() as f64).sqrt() as usize;
-    let env = |k: &str| std::env::var(k).ok().and_then(|v| v.parse::<usize>().ok()).unwrap_or(0);
-    let (pre, mid) = (env("PRE"), env("MID"));
-    let smooth = |fields: &mut Fields, contact: &mut Vec<bool>, k: usize| {
-        if k == 0 { return; }
-        for j in system.interior.iter() { if system.gap(fields, j) < 0.0 { system.close(fields, j); } }
-        for _ in 0..k { monotone::relax(system, fields); }
-        for j in system.interior.iter() { contact[j] = system.gap(fields, j) == 0.0; }
-    };
-    smooth(&mut fields, &mut contact, pre);
     let mut seen = HashSet::from([fingerprint(&contact)]);
     let mut fewest = usize::MAX;
     let mut idle = 0;
@@ -67,11 +90,9 @@ pub(crate) fn solve(
                 status: Status::Converged,
             });
         }
-        let changes = found.release.len() + found.attach.len();
-        idle = if changes < fewest { 0 } else { idle + 1 };
-        fewest = fewest.min(changes);
-        apply(&found, &mut contact);
-        smooth(&mut fields, &mut contact, mid);
+        idle = if found.count < fewest { 0 } else { idle + 1 };
+        fewest = fewest.min(found.count);
+        system.relaxed_contact(&mut fields, &mut contact, SWEEPS);
         if idle > PATIENCE || !seen.insert(fingerprint(&contact)) {
             return monotone::solve(system, solver, fields, solves);
         }
@@ -91,7 +112,13 @@ pub(crate) fn step(
     }
     solver.prepare(system, contact)?;
     solver.correct(system, fields, contact)?;
-    Ok(system.violations(fields, contact))
+    let mut found = system.violations(fields, contact);
+    if found.worst > ROUNDING && found.worst < SUSPECT {
+        // Perhaps it is the error of the solve.
+        solver.correct(system, fields, contact)?;
+        found = system.violations(fields, contact);
+    }
+    Ok(found)
 }
 
 /// Refines the last solution once and closes gaps that are negative by rounding.
@@ -102,21 +129,8 @@ pub(crate) fn finish(
     contact: &[bool],
 ) -> Result<(), SolveError> {
     solver.correct(system, fields, contact)?;
-    for j in system.interior.iter() {
-        if system.gap(fields, j) < 0.0 {
-            system.close(fields, j);
-        }
-    }
+    system.project(fields);
     Ok(())
-}
-
-fn apply(found: &Violations, contact: &mut [bool]) {
-    for &j in &found.release {
-        contact[j as usize] = false;
-    }
-    for &j in &found.attach {
-        contact[j as usize] = true;
-    }
 }
 
 fn fingerprint(contact: &[bool]) -> u64 {

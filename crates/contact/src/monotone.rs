@@ -1,15 +1,21 @@
 //! The method that cannot fail to converge: projected Gauss-Seidel with a truncated exact correction.
 //!
 //! The truncated nonsmooth Newton multigrid method of Graeser and Kornhuber (2009) with a direct solver in place of the multigrid cycle.
-//! A step relaxes every vertex forwards and backwards under its constraint, solves exactly on the vertices whose gap is open, projects
+//! A step relaxes every vertex a few times under its constraint, solves exactly on the vertices whose gap is open, projects
 //! the result to nonnegative gaps, and goes along that direction to the least energy. No part raises the energy, and the
 //! relaxation alone converges for any symmetric positive definite matrix, M-matrix or not; the correction makes it end.
 
-use crate::active_set::{Outcome, ROUNDING, finish};
+use crate::active_set::{self, Outcome, ROUNDING, SWEEPS};
 use crate::error::SolveError;
 use crate::free::FreeSolver;
 use crate::solution::Status;
 use crate::system::{Fields, System};
+
+/// A violation up to this size is kept in case rounding, on a badly shaped mesh, allows none smaller.
+const NEARLY: f64 = 1e-11;
+
+/// Steps without improvement after which such an iterate is taken.
+const PATIENCE: usize = 10;
 
 /// Steps from a guess of the fields, feasible or not, until the contact set confirms itself as in the active set method.
 ///
@@ -20,59 +26,61 @@ pub(crate) fn solve(
     mut fields: Fields,
     solves: usize,
 ) -> Result<Outcome, SolveError> {
-    for j in system.interior.iter() {
-        if system.gap(&fields, j) < 0.0 {
-            system.close(&mut fields, j);
-        }
-    }
     let limit = 200 + 4 * (system.interior.len() as f64).sqrt() as usize;
     let mut contact = vec![false; fields[0].len()];
-    for step in 1..=limit {
-        relax(system, &mut fields);
-        for j in system.interior.iter() {
-            contact[j] = system.gap(&fields, j) == 0.0;
-        }
+    let mut best: Option<Outcome> = None;
+    let mut least = f64::INFINITY;
+    let mut idle = 0;
+    for taken in 1..=limit {
+        system.relaxed_contact(&mut fields, &mut contact, SWEEPS);
         let mut candidate = fields.clone();
-        solver.prepare(system, &contact)?;
-        solver.correct(system, &mut candidate, &contact)?;
-        if system.violations(&candidate, &contact).worst <= ROUNDING {
-            finish(system, solver, &mut candidate, &contact)?;
-            return Ok(Outcome {
-                fields: candidate,
-                contact,
-                solves: solves + step,
+        let found = active_set::step(system, solver, &mut candidate, &contact)?;
+        let converged = found.worst <= ROUNDING;
+        if found.worst < least {
+            idle = 0;
+            least = found.worst;
+        } else {
+            idle += 1;
+        }
+        if converged || (idle == 0 && least <= NEARLY) {
+            best = Some(Outcome {
+                fields: candidate.clone(),
+                contact: contact.clone(),
+                solves: solves + taken,
                 monotone: true,
-                status: Status::Converged,
+                status: if converged {
+                    Status::Converged
+                } else {
+                    Status::Stagnated
+                },
             });
+        }
+        if converged || (idle >= PATIENCE && best.is_some()) {
+            break;
         }
         descend(system, &mut fields, candidate);
     }
-    Ok(Outcome {
-        fields,
-        contact,
-        solves: solves + limit,
-        monotone: true,
-        status: Status::Limit,
-    })
-}
-
-/// One projected Gauss-Seidel sweep forwards and one backwards.
-pub(crate) fn relax(system: &System, fields: &mut Fields) {
-    for j in system.interior.iter() {
-        system.relax(fields, j);
-    }
-    for j in system.interior.iter().rev() {
-        system.relax(fields, j);
+    match best {
+        Some(mut outcome) => {
+            if outcome.contact != contact {
+                solver.prepare(system, &outcome.contact)?;
+            }
+            active_set::finish(system, solver, &mut outcome.fields, &outcome.contact)?;
+            Ok(outcome)
+        }
+        None => Ok(Outcome {
+            fields,
+            contact,
+            solves: solves + limit,
+            monotone: true,
+            status: Status::Limit,
+        }),
     }
 }
 
 /// Moves from feasible fields towards the projection of the candidate, to the least energy that keeps the gaps nonnegative.
 fn descend(system: &System, fields: &mut Fields, mut candidate: Fields) {
-    for j in system.interior.iter() {
-        if system.gap(&candidate, j) < 0.0 {
-            system.close(&mut candidate, j);
-        }
-    }
+    system.project(&mut candidate);
     let direction: Fields = fields
         .iter()
         .zip(&candidate)
@@ -105,9 +113,5 @@ fn descend(system: &System, fields: &mut Fields, mut candidate: Fields) {
             u[j] += length * d[j];
         }
     }
-    for j in system.interior.iter() {
-        if system.gap(fields, j) < 0.0 {
-            system.close(fields, j);
-        }
-    }
+    system.project(fields);
 }

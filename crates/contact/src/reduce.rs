@@ -119,6 +119,15 @@ impl<'a> Proportional<'a> {
         sum / large / (1.0 + small / large)
     }
 
+    /// Turns multipliers y of the gap into action forces z.
+    pub fn forces(&self, multiplier: &mut [f64]) {
+        let [t1, t2] = self.tension;
+        let harmonic = t1 / (1.0 + t1 / t2);
+        for y in multiplier {
+            *y *= harmonic;
+        }
+    }
+
     /// The displacements from mean and gap; the heights on the boundary.
     ///
     /// Rounding is monotone, so a gap that is not negative stays so, and a closed one closed.

@@ -22,13 +22,11 @@ pub(crate) struct System<'a> {
     pub interior: &'a Interior,
 }
 
-/// Vertices where an iterate contradicts its contact set.
-#[derive(Clone, Debug, Default)]
+/// How far an iterate contradicts its contact set.
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Violations {
-    /// In contact, but pulled: the multiplier is negative beyond rounding.
-    pub release: Vec<u32>,
-    /// Not in contact, but the gap is negative.
-    pub attach: Vec<u32>,
+    /// Vertices in contact whose multiplier is negative beyond rounding, and vertices elsewhere with a negative gap.
+    pub count: usize,
     /// The largest violation, relative to the largest displacement, a multiplier taken as z_j/d_j.
     pub worst: f64,
 }
@@ -121,13 +119,13 @@ impl System<'_> {
             if contact[j] {
                 let y = self.multiplier(u, j);
                 if y < 0.0 && y < -self.rounding(u, j) {
-                    found.release.push(j as u32);
+                    found.count += 1;
                     found.worst = found.worst.max(-y / self.diagonal(j) / unit);
                 }
             } else {
                 let gap = self.gap(u, j);
                 if gap < 0.0 {
-                    found.attach.push(j as u32);
+                    found.count += 1;
                     found.worst = found.worst.max(-gap / unit);
                 }
             }
@@ -144,6 +142,31 @@ impl System<'_> {
         }
         if self.gap(u, j) < 0.0 {
             self.close(u, j);
+        }
+    }
+
+    /// Closes every gap that is negative.
+    pub fn project(&self, u: &mut Fields) {
+        for j in self.interior.iter() {
+            if self.gap(u, j) < 0.0 {
+                self.close(u, j);
+            }
+        }
+    }
+
+    /// Projects the fields, relaxes every vertex `sweeps` times forwards and backwards, and reads off where the gap is closed.
+    pub fn relaxed_contact(&self, u: &mut Fields, contact: &mut [bool], sweeps: usize) {
+        self.project(u);
+        for _ in 0..sweeps {
+            for j in self.interior.iter() {
+                self.relax(u, j);
+            }
+            for j in self.interior.iter().rev() {
+                self.relax(u, j);
+            }
+        }
+        for j in self.interior.iter() {
+            contact[j] = self.gap(u, j) == 0.0;
         }
     }
 

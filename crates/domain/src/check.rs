@@ -7,10 +7,14 @@
 //!
 //! What is not found: two pieces of the mesh that overlap without a common vertex.
 
+mod defect;
+
 use std::f64::consts::TAU;
 
+pub use defect::MeshDefect;
+
+use crate::RawMesh;
 use crate::geometry::{Frame, Point, cross, orient};
-use crate::{MeshDefect, RawMesh};
 
 /// A vertex within this distance of an edge, relative to the length of the edge, hangs in it.
 const HANGING: f64 = 1e-12;

@@ -1,6 +1,6 @@
 //! From shapes and mesh files to raw initial meshes.
 //!
-//! Four sources give a [`RawMesh`]: [`rectangle`], [`disk`], [`polygon`] (constrained Delaunay
+//! Four sources give a [`RawMesh`]: [`rectangle`], [`disk`], [`polygon()`] (constrained Delaunay
 //! triangulation with refinement) and [`gmsh::read`] (MSH 2.2 and 4.1). Whatever the source, the
 //! mesh has passed [`check`](check::check): counter-clockwise triangles, no unused points,
 //! conforming. Nothing in this crate knows about refinement edges or finite elements.

@@ -2,7 +2,8 @@
 
 mod support;
 
-use estimate::{energy, paper, residual, root_sum};
+use estimate::{energy, oscillation, paper, residual, root_sum};
+use fem_core::integrate::loads;
 use support::{Reference, cases, difference};
 
 #[test]
@@ -32,5 +33,44 @@ fn indicators_agree_with_the_reference() {
         }
         let halves: f64 = indicators.eta_e_cell.iter().sum();
         assert!((halves - indicators.eta_e_sum()).abs() <= 1e-13 * halves);
+    }
+}
+
+#[test]
+fn oscillation_agrees_where_loads_are_polynomials() {
+    type Load = fn(f64, f64) -> f64;
+    let loaded: [(&str, [Load; 2]); 3] = [
+        (
+            "P5_delaunay_16",
+            [
+                |x, y| 4.0 - 2.0 * (x * x + y * y),
+                |x, y| 4.0 * (x * x + y * y) - 8.0,
+            ],
+        ),
+        (
+            "P6_cross_8",
+            [
+                |x, y| 2.0 - x - 2.0 * (x * x + y * y),
+                |x, y| 14.0 + x - 6.0 * (x * x + y * y),
+            ],
+        ),
+        (
+            "P6c_right_16",
+            [|_, _| 0.0, |x, y| 16.0 - 8.0 * (x * x + y * y)],
+        ),
+    ];
+    for (file, fields) in loaded {
+        let case = cases::all().into_iter().find(|c| c.file == file).unwrap();
+        let Reference {
+            mesh,
+            mut problem,
+            values,
+            ..
+        } = Reference::read(file, &case.tension);
+        problem.loads = fields.map(|f| loads(&mesh, &f).unwrap());
+        let total = root_sum(&oscillation(&mesh, &problem));
+        let off = difference(&[total], &[values["totals"]["osc"].as_f64().unwrap()]);
+        println!("{file} osc {off:.1e}");
+        assert!(off <= 1e-12, "{file} {total:e} {off:e}");
     }
 }

@@ -3,18 +3,18 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use adapt::{Problem, Settings};
+use adapt::{DataError, Problem, Settings};
 use estimate::Gradient;
 use expression::Variable;
 use fem_core::scale::exponent_of;
 use fem_core::{Field, Scale};
 
-use crate::check::{Survey, gradient};
+use crate::check::{Survey, gradient, refusal};
 use crate::domain_mesh;
 use crate::error::SceneError;
 use crate::fields::{ExpressionField, LowerHeight};
-use crate::source::Sources;
-use crate::validate::{Checked, Exact, Formula};
+use crate::source::{Fault, Sources};
+use crate::validate::{Checked, Exact, Formula, blame};
 
 /// A scene that is ready to run.
 #[derive(Clone)]
@@ -29,6 +29,59 @@ pub struct Scene {
     pub text: String,
     /// What `membranes check` tells of it.
     pub overview: Overview,
+    /// The error without message at every key that gives a function.
+    places: Places,
+}
+
+impl Scene {
+    /// What the loop found wrong with the data of the scene, at the key that gives them.
+    pub fn data_error(&self, error: &DataError) -> SceneError {
+        match error {
+            DataError::Field(field) => self.places.at(&field.name, refusal(field)),
+            DataError::Tension { membrane, .. } => {
+                self.places.at(&format!("{membrane}.tension"), Fault::nowhere(error.to_string()))
+            }
+            DataError::Heights { .. } => {
+                self.places.at("lower.boundary", Fault::nowhere(error.to_string()))
+            }
+        }
+    }
+}
+
+/// Errors at keys, by the name of the key; without message.
+#[derive(Clone)]
+struct Places {
+    keys: Vec<(String, SceneError)>,
+    file: SceneError,
+}
+
+impl Places {
+    fn new(checked: &Checked, sources: &Sources<'_>) -> Self {
+        let mut formulas: Vec<&Formula> = checked.tension.iter().collect();
+        formulas.extend(checked.load.iter().chain(&checked.boundary));
+        if let Some(exact) = &checked.exact {
+            formulas.extend(&exact.displacement);
+            formulas.extend([&exact.action, &exact.sigma, &exact.contact].into_iter().flatten());
+        }
+        let error = |formula: &Formula| {
+            let fault = blame(&formula.place, String::new());
+            (formula.name.clone(), sources.report(fault))
+        };
+        Places {
+            keys: formulas.into_iter().map(error).collect(),
+            file: sources.report(Fault::nowhere("")),
+        }
+    }
+
+    /// The key that `name` begins with or is made from.
+    fn at(&self, name: &str, fault: Fault) -> SceneError {
+        let name = name.trim_start_matches("d(");
+        let found = self.keys.iter().find(|(key, _)| name.starts_with(key.as_str()));
+        let mut report = found.map_or(&self.file, |(_, error)| error).report().clone();
+        report.message = fault.message;
+        report.hint = fault.hint;
+        SceneError::new(report)
+    }
 }
 
 /// Facts about a scene, in the user's units.
@@ -61,6 +114,7 @@ pub(crate) fn scene(
 ) -> Result<Scene, SceneError> {
     let initial = domain_mesh::build(&checked.shape, sources, folder)?;
     let report = |fault| sources.report(fault);
+    let places = Places::new(&checked, sources);
     let survey = Survey {
         mesh: &initial.mesh,
         length: initial.length,
@@ -116,6 +170,7 @@ pub(crate) fn scene(
         settings: checked.settings,
         text,
         overview,
+        places,
     })
 }
 

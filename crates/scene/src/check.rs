@@ -1,7 +1,7 @@
 //! Samples the data of a scene on the initial mesh: are they finite, positive, in order, and how large are they.
 
 use expression::{Expression, Variable};
-use fem_core::{Circle, Field, FieldError, Mesh, Samples};
+use fem_core::{Circle, Field, FieldError, Mesh, Samples, TriangleId};
 
 use crate::fields::{ExpressionField, LowerHeight};
 use crate::source::Fault;
@@ -119,19 +119,16 @@ impl Survey<'_> {
 
     fn disorder(&self, boundary: &[Formula; 2], error: &FieldError) -> Fault {
         let place = boundary[1].place.clone().or(boundary[0].place.clone());
-        let (x, y) = (error.x, error.y);
-        let at = |formula: &Formula| formula.expression.eval_at(x, y, 0.0);
-        let mut message = format!(
-            "`lower.boundary` exceeds `upper.boundary` by {} at ({x}, {y})",
-            error.value
-        );
-        if !boundary.iter().any(|formula| formula.expression.uses_region()) {
-            message = format!(
-                "`lower.boundary` = {} exceeds `upper.boundary` = {} at ({x}, {y})",
-                at(&boundary[1]),
-                at(&boundary[0])
-            );
-        }
+        let height = |formula: &Formula| short(formula.expression.eval_at(error.x, error.y, 0.0));
+        let [upper, lower] = [height(&boundary[0]), height(&boundary[1])];
+        let at = format!("({}, {})", short(error.x), short(error.y));
+        let region = boundary.iter().any(|formula| formula.expression.uses_region());
+        let message = if region || upper == lower {
+            let excess = short(error.value);
+            format!("`lower.boundary` exceeds `upper.boundary` by {excess} at {at}")
+        } else {
+            format!("`lower.boundary` = {lower} exceeds `upper.boundary` = {upper} at {at}")
+        };
         blame(&place, message).hint("the lower membrane must not be fixed above the upper one anywhere")
     }
 
@@ -195,7 +192,7 @@ impl Survey<'_> {
         for start in (0..count).step_by(CHUNK) {
             (x.clear(), y.clear(), region.clear());
             for t in start..count.min(start + CHUNK) {
-                let [a, b, c] = self.mesh.corners(fem_core::TriangleId(t as u32));
+                let [a, b, c] = self.mesh.corners(TriangleId(t as u32));
                 for [l, m, n] in INTERIOR {
                     x.push(l * a[0] + m * b[0] + n * c[0]);
                     y.push(l * a[1] + m * b[1] + n * c[1]);
@@ -239,15 +236,39 @@ fn on_edge(p: [f64; 2], q: [f64; 2], curve: Option<Circle>) -> [[f64; 2]; 5] {
 }
 
 fn refuse(formula: &Formula, error: FieldError) -> Fault {
-    let FieldError { name, value, x, y } = &error;
-    if value.is_finite() {
-        let message = format!("`{name}` must be greater than 0, but is {value} at ({x}, {y})");
-        return blame(&formula.place, message);
+    Fault {
+        place: formula.place.clone(),
+        ..refusal(&error)
     }
-    let fault = blame(&formula.place, error.to_string());
-    if name.starts_with('d') {
-        fault.hint("it is the derivative, as an expression, that is not finite there")
+}
+
+/// What is wrong with a value, and what helps.
+pub(crate) fn refusal(error: &FieldError) -> Fault {
+    let name = &error.name;
+    let value = short(error.value);
+    let at = format!("({}, {})", short(error.x), short(error.y));
+    if error.value.is_finite() && name.ends_with(".tension") {
+        return Fault::nowhere(format!("`{name}` must be greater than 0, but is {value} at {at}"));
+    }
+    let fault = Fault::nowhere(format!("`{name}` is {value} at {at}"));
+    if error.value.is_finite() {
+        fault
+    } else if name.starts_with("d(") {
+        fault.hint("an exact field is differentiated as an expression; this derivative is not finite there")
     } else {
         fault.hint("`if(condition, then, else)` evaluates only the branch that is taken")
+    }
+}
+
+/// A number with six significant digits, for messages.
+pub(crate) fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.abs().to_string();
+    }
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    if (1e-4..1e9).contains(&rounded.abs()) {
+        rounded.to_string()
+    } else {
+        format!("{rounded:e}")
     }
 }

@@ -94,7 +94,10 @@ fn read_text(path: &Path, name: &str) -> Result<String, SceneError> {
         return Err(failed("the scene is a directory".into(), hint, Kind::Input));
     }
     let bytes = std::fs::read(path).map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound => failed("the scene does not exist".into(), None, Kind::Input),
+        std::io::ErrorKind::NotFound => {
+            let hint = Some("a relative path is taken from the current folder");
+            failed("the scene does not exist".into(), hint, Kind::Input)
+        },
         _ => failed(format!("the scene cannot be read: {error}"), None, Kind::Reading),
     })?;
     String::from_utf8(bytes).map_err(|error| {

@@ -44,6 +44,9 @@ fn one(argument: &str, source: usize) -> Result<Override, Fault> {
                 .chars()
                 .all(|c| c.is_alphanumeric() || c == '_' || c == '-')
     };
+    if key.trim().is_empty() {
+        return Err(malformed("the key before `=` is missing"));
+    }
     if !path.iter().all(is_name) {
         return Err(malformed(&format!("`{}` is no key", key.trim())));
     }

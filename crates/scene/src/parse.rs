@@ -262,7 +262,7 @@ fn output(top: &Section<'_>) -> Result<Output, Fault> {
     }
     Ok(Output {
         fields: section.get("fields", fields)?,
-        edges: section.get("edges", boolean)?.map(|at| at.value),
+        edges: section.get("edges", boolean)?,
     })
 }
 

@@ -96,6 +96,7 @@ fn unknown_key(section: &str, entry: &Entry, known: &[&str]) -> Fault {
     };
     let valid = match section {
         "" => format!("valid at the top: {}", known.join(", ")),
+        "domain" => format!("valid domains: {}", known.join(", ")),
         _ => format!("valid keys: {}", known.join(", ")),
     };
     let hint = match nearest(&entry.key, known) {
@@ -122,8 +123,8 @@ pub(crate) fn nearest<'k>(name: &str, known: &[&'k str]) -> Option<&'k str> {
         .iter()
         .map(|known| (strsim::damerau_levenshtein(&lower, known), *known))
         .filter(|(distance, known)| {
-            // At least half of the shorter name must be right.
-            *distance <= allowed && 2 * distance <= known.len()
+            // More than half of the known name must be right.
+            *distance <= allowed && 2 * distance < known.len()
         })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, known)| known)
@@ -174,7 +175,11 @@ pub(crate) fn list<T>(
     mut item: impl FnMut(&Node, &str) -> Result<T, Fault>,
 ) -> Result<Vec<At<T>>, Fault> {
     let Value::Array(items) = &node.value else {
-        return Err(wrong_type(node, path, &format!("an array of {of}")));
+        let fault = wrong_type(node, path, &format!("an array of {of}"));
+        return Err(match &node.value {
+            Value::Text(text) => fault.hint(format!("write `[\"{text}\"]`")),
+            _ => fault,
+        });
     };
     items
         .iter()

@@ -159,7 +159,7 @@ pub struct Output {
     /// `fields`.
     pub fields: Option<At<Fields>>,
     /// `edges`.
-    pub edges: Option<bool>,
+    pub edges: Option<At<bool>>,
 }
 
 /// `output.fields`.

@@ -1,7 +1,7 @@
 //! From [`SceneFile`] to [`Checked`]: expressions parsed, numbers evaluated, every rule that needs no mesh applied.
 
 use adapt::Settings;
-use adapt::settings::{Children, Fields as Wanted, Stop as Rules};
+use adapt::settings::{Children, Estimator, Fields as Wanted, Stop as Rules};
 use contact::Tolerance;
 use expression::{Expression, ParseError, Scope, ScopeError};
 
@@ -168,8 +168,13 @@ impl Reader<'_> {
     fn number(&self, at: &At<Number>) -> Result<f64, Fault> {
         match &at.value {
             Number::Value(value) => Ok(*value),
-            Number::Formula(text) => Expression::parse_constant(text, &self.scope)
-                .map_err(|error| self.parse_fault(&at.place, text, error)),
+            Number::Formula(text) => {
+                Expression::parse_constant(text, &self.scope).map_err(|mut error| {
+                    // Names of the place do not help where a single number is wanted.
+                    error.hint = error.hint.map(|hint| hint.replace("`x`, `y`, `region`, ", ""));
+                    self.parse_fault(&at.place, text, error)
+                })
+            }
         }
     }
 
@@ -356,8 +361,14 @@ impl Reader<'_> {
             settings.estimate.also.dedup();
         }
         settings.stop = self.stop(&file.stop)?;
-        if let Some(edges) = file.output.edges {
-            settings.output.edges = edges;
+        if let Some(edges) = &file.output.edges {
+            settings.output.edges = edges.value;
+        }
+        if let Some(at) = file.output.edges.as_ref().filter(|at| at.value)
+            && !settings.estimate.wants(Estimator::Paper)
+        {
+            let message = "`output.edges = true` needs the estimator \"paper\", which computes `eta_e`";
+            return Err(Fault::at(&at.place, message).hint("add \"paper\" to `estimate.also`"));
         }
         if let Some(fields) = &file.output.fields {
             settings.output.fields = self.fields(fields)?;
@@ -440,13 +451,13 @@ impl Reader<'_> {
     }
 }
 
-/// Where names and numbers are allowed, text that is neither is taken for a misspelt name.
+/// Where names and numbers are allowed, text that is no number is taken for a wrong name.
 fn or_names(fault: Fault, at: &Option<At<Number>>, name: &str, rule: &str) -> Fault {
     match at {
         Some(At {
             value: Number::Formula(text),
             place,
-        }) if text.chars().all(|c| c.is_alphabetic() || c == '-' || c == '_') => {
+        }) if !fault.message.starts_with(&format!("`{name}`")) => {
             Fault::at(place, format!("unknown value \"{text}\" of `{name}`"))
                 .hint(format!("it must be {rule}"))
         }

@@ -21,7 +21,7 @@ pub enum Place {
 pub struct GmshError {
     file: PathBuf,
     place: Place,
-    fault: GmshFault,
+    fault: Box<GmshFault>,
 }
 
 impl GmshError {
@@ -29,7 +29,7 @@ impl GmshError {
         Self {
             file: file.to_path_buf(),
             place: flaw.place,
-            fault: flaw.fault,
+            fault: Box::new(flaw.fault),
         }
     }
 
@@ -58,7 +58,7 @@ impl GmshError {
 
     /// Whether the file could not be read at all, so that nothing is known about its content.
     pub fn is_io(&self) -> bool {
-        matches!(self.fault, GmshFault::Io { .. })
+        matches!(*self.fault, GmshFault::Io { .. })
     }
 
     /// What to do instead.
@@ -81,7 +81,7 @@ impl fmt::Display for GmshError {
 
 impl std::error::Error for GmshError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match &self.fault {
+        match &*self.fault {
             GmshFault::Io { error } => Some(error),
             GmshFault::Defect { defect, .. } => Some(defect),
             _ => None,

@@ -17,7 +17,7 @@ use crate::quality::ANGLE_LIMIT;
 use crate::{DomainError, MAX_TRIANGLES};
 
 /// Vertices allowed for fine details, beyond those that the size accounts for.
-const DETAIL_VERTICES: usize = 1_000_000;
+const DETAIL_VERTICES: usize = 300_000;
 
 /// The triangulation may have this many times the triangles of the ideal mesh.
 const SURPLUS: f64 = 10.0;

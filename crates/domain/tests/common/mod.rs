@@ -1,4 +1,4 @@
-//! Writes meshes in every Gmsh format that is read, and small helpers.
+//! Writes meshes in every Gmsh format that is read.
 #![allow(dead_code)]
 
 use domain::RawMesh;

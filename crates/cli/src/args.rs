@@ -1,0 +1,199 @@
+//! What the user typed, and what that asks for.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Args, Parser, Subcommand};
+
+/// What is to be done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Task {
+    /// `membranes run`.
+    Run(RunArgs),
+    /// `membranes check`.
+    Check(CheckArgs),
+    /// Something that later versions do.
+    Later(String),
+}
+
+/// Adaptive finite elements for the unilateral contact between two elastic membranes.
+#[derive(Parser, Debug)]
+#[command(name = "membranes", version, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Solve a scene adaptively and write the results
+    Run(RunArgs),
+    /// Read a scene, build its initial mesh, say what will be modelled, and write nothing
+    Check(CheckArgs),
+    #[command(hide = true, disable_help_flag = true)]
+    Study(Rest),
+    #[command(hide = true, disable_help_flag = true)]
+    Verify(Rest),
+    #[command(hide = true, disable_help_flag = true)]
+    Plot(Rest),
+    #[command(hide = true, disable_help_flag = true)]
+    Schema(Rest),
+    #[command(hide = true, disable_help_flag = true)]
+    New(Rest),
+    #[command(hide = true, disable_help_flag = true)]
+    Completions(Rest),
+}
+
+/// Commands that are typed; for suggestions.
+const COMMANDS: [&str; 8] = [
+    "run",
+    "check",
+    "study",
+    "verify",
+    "plot",
+    "schema",
+    "new",
+    "completions",
+];
+
+/// Arguments of `membranes run`.
+#[derive(Args, Clone, Debug, PartialEq)]
+pub struct RunArgs {
+    /// The scene file
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Folder of the results [default: runs/<name of the scene>]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Override a key of the scene by its dotted name, for example stop.vertices=50000
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Replace the files of an earlier run
+    #[arg(long)]
+    pub force: bool,
+    /// No progress on standard error
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the summary as a JSON object instead of the final line
+    #[arg(long)]
+    pub json: bool,
+    #[arg(long, hide = true, value_name = "N")]
+    threads: Option<String>,
+    #[arg(long, hide = true)]
+    resume: bool,
+}
+
+/// Arguments of `membranes check`.
+#[derive(Args, Clone, Debug, PartialEq)]
+pub struct CheckArgs {
+    /// The scene file
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Override a key of the scene by its dotted name, for example domain.disk.size=0.1
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Print a JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Args, Debug)]
+struct Rest {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+    _rest: Vec<OsString>,
+}
+
+/// Understands the arguments; on help, version and mistakes everything is said and only the exit code is left.
+pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Task, u8> {
+    let command = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli.command,
+        Err(error) => {
+            let error = with_suggestion(error);
+            // Nothing is left to say when this fails too.
+            let _ = error.print();
+            return Err(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    let later = |name: &str| Ok(Task::Later(format!("membranes {name}")));
+    match command {
+        Command::Run(run) if run.threads.is_some() => Ok(Task::Later("--threads".into())),
+        Command::Run(run) if run.resume => Ok(Task::Later("--resume".into())),
+        Command::Run(run) => Ok(Task::Run(run)),
+        Command::Check(check) => Ok(Task::Check(check)),
+        Command::Study(_) => later("study"),
+        Command::Verify(_) => later("verify"),
+        Command::Plot(_) => later("plot"),
+        Command::Schema(_) => later("schema"),
+        Command::New(_) => later("new"),
+        Command::Completions(_) => later("completions"),
+    }
+}
+
+/// Adds the nearest command to the message about an unknown one; clap finds it only when the beginning is right.
+fn with_suggestion(mut error: clap::Error) -> clap::Error {
+    if error.kind() == ErrorKind::InvalidSubcommand
+        && error.get(ContextKind::SuggestedSubcommand).is_none()
+        && let Some(ContextValue::String(typed)) = error.get(ContextKind::InvalidSubcommand)
+    {
+        let near = COMMANDS
+            .into_iter()
+            .map(|known| (strsim::damerau_levenshtein(typed, known), known))
+            .filter(|(distance, known)| 2 * distance <= known.len().max(2))
+            .min_by_key(|(distance, _)| *distance);
+        if let Some((_, known)) = near {
+            let suggestion = ContextValue::Strings(vec![known.to_owned()]);
+            error.insert(ContextKind::SuggestedSubcommand, suggestion);
+        }
+    }
+    error
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> Result<Task, u8> {
+        parse(text.split_whitespace().map(OsString::from))
+    }
+
+    #[test]
+    fn clap_accepts_the_definitions() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn runs_and_checks() {
+        let Ok(Task::Run(run)) = parsed("membranes run a.toml --set b=1 --out d --set c=2 --force")
+        else {
+            panic!("a run")
+        };
+        assert_eq!(run.scene, PathBuf::from("a.toml"));
+        assert_eq!(run.set, ["b=1", "c=2"]);
+        assert_eq!(run.out, Some(PathBuf::from("d")));
+        assert!(run.force && !run.quiet && !run.json);
+        assert!(matches!(parsed("membranes check a.toml --json"), Ok(Task::Check(c)) if c.json));
+    }
+
+    #[test]
+    fn later_commands_are_known_by_name() {
+        let later = |text: &str| match parsed(text) {
+            Ok(Task::Later(what)) => what,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(later("membranes study a.toml --out d"), "membranes study");
+        assert_eq!(later("membranes verify"), "membranes verify");
+        assert_eq!(later("membranes plot --help"), "membranes plot");
+        assert_eq!(later("membranes run a.toml --threads 4"), "--threads");
+        assert_eq!(later("membranes run a.toml --resume"), "--resume");
+    }
+
+    #[test]
+    fn mistakes_are_exit_code_2() {
+        for text in ["membranes", "membranes rnu a.toml", "membranes run", "membranes run a --nope"] {
+            assert_eq!(parsed(text), Err(2), "{text}");
+        }
+        assert_eq!(parsed("membranes --version"), Err(0));
+    }
+}

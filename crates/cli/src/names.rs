@@ -1,0 +1,71 @@
+//! Settings by the names that the scene file has for them.
+
+use adapt::settings::{Children, Estimator, Fields, Stop, Strategy};
+use contact::{Solver, Tolerance};
+
+/// `solve.solver`.
+pub fn solver(solver: Solver) -> &'static str {
+    match solver {
+        Solver::Auto => "auto",
+        Solver::Clarabel => "clarabel",
+        Solver::ActiveSet => "active-set",
+    }
+}
+
+/// `solve.tolerance`.
+pub fn tolerance(tolerance: Tolerance) -> String {
+    match tolerance {
+        Tolerance::Balanced => "balanced".into(),
+        Tolerance::Relative(value) => value.to_string(),
+    }
+}
+
+/// `estimate.estimator`.
+pub fn estimator(estimator: Estimator) -> &'static str {
+    match estimator {
+        Estimator::Residual => "residual",
+        Estimator::Paper => "paper",
+    }
+}
+
+/// `mark.strategy`.
+pub fn strategy(strategy: Strategy) -> &'static str {
+    match strategy {
+        Strategy::Doerfler => "doerfler",
+        Strategy::Maximum => "maximum",
+        Strategy::Uniform => "uniform",
+    }
+}
+
+/// `mark.children`.
+pub fn children(children: Children) -> usize {
+    match children {
+        Children::Two => 2,
+        Children::Four => 4,
+    }
+}
+
+/// `output.fields`.
+pub fn fields(fields: Fields) -> String {
+    match fields {
+        Fields::All => "all".into(),
+        Fields::Last => "last".into(),
+        Fields::None => "none".into(),
+        Fields::Every(n) => format!("every {n}"),
+    }
+}
+
+/// The rules under `[stop]` that apply, with their values.
+pub fn rules(stop: &Stop) -> Vec<(&'static str, f64)> {
+    let count = |n: Option<usize>| n.map(|n| n as f64);
+    [
+        ("relative_error", stop.relative_error),
+        ("error", stop.error),
+        ("vertices", count(stop.vertices)),
+        ("levels", count(stop.levels)),
+        ("seconds", stop.seconds),
+    ]
+    .into_iter()
+    .filter_map(|(name, value)| Some((name, value?)))
+    .collect()
+}

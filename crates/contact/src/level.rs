@@ -1,0 +1,303 @@
+//! One problem on one mesh: which model is solved by which method, and the solution put together from the outcome.
+
+use crate::active_set::{self, Guess};
+use crate::error::SolveError;
+use crate::free::{FreeSolver, PairFactor};
+use crate::interior::{Interior, Role, ScalarFactor};
+use crate::interior_point;
+use crate::problem::DiscreteProblem;
+use crate::reduce::{Proportional, initial_pair, pair_system};
+use crate::solution::{Reduction, Solution, SolveInfo, Status, kkt_residual};
+use crate::start::Start;
+use crate::system::{Fields, System};
+
+/// Which method solves the inequality.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Method {
+    /// The active set method, with its monotone fallback.
+    ActiveSet,
+    /// The interior-point method.
+    InteriorPoint,
+    /// The fallback alone.
+    #[cfg(test)]
+    Monotone,
+}
+
+/// What a method found out about the inequality.
+struct Found {
+    fields: Fields,
+    contact: Vec<bool>,
+    /// Multiplier of the system, where the method has its own; else it is read from the rows.
+    multiplier: Option<Vec<f64>>,
+    iterations: usize,
+    solver: &'static str,
+    status: Status,
+}
+
+/// A problem with its unknowns and the factor that is analysed once.
+pub(crate) struct Level<'a> {
+    problem: &'a DiscreteProblem,
+    interior: Interior,
+    reduce: bool,
+    scalar: Option<ScalarFactor>,
+}
+
+impl<'a> Level<'a> {
+    /// No work yet.
+    pub fn new(problem: &'a DiscreteProblem, reduce: bool) -> Level<'a> {
+        Level {
+            problem,
+            interior: Interior::new(&problem.boundary),
+            reduce,
+            scalar: None,
+        }
+    }
+
+    /// Solves by one method; the KKT residual is measured, not judged.
+    pub fn solve(&mut self, method: Method, start: Option<&Start>) -> Result<Solution, SolveError> {
+        let reduced = Proportional::of(self.problem).filter(|_| self.reduce);
+        match reduced {
+            Some(model) => self.solve_reduced(&model, method, start),
+            None => self.solve_pair(method, start),
+        }
+    }
+
+    fn solve_reduced(
+        &mut self,
+        model: &Proportional,
+        method: Method,
+        start: Option<&Start>,
+    ) -> Result<Solution, SolveError> {
+        let mut scalar = self.take_scalar()?;
+        let interior = &self.interior;
+        let system = model.system(interior);
+        let guess = Guess {
+            fields: model.initial_gap(interior, start),
+            contact: self.first_set(&system, start),
+            warm: start.is_some(),
+        };
+        let mut solver = FreeSolver::Scalar {
+            factor: &mut scalar,
+            role: model.role,
+        };
+        let mut found = run(&system, &mut solver, guess, method)?;
+        let mean = mean(model, interior, &mut scalar, start)?;
+        self.scalar = Some(scalar);
+        let displacement = model.displacements(&self.interior, &mean, &found.fields[0]);
+        if let Some(multiplier) = &mut found.multiplier {
+            model.forces(multiplier);
+        }
+        let reduction = self.named(&found.contact, model.reduction);
+        self.finish(displacement, found, reduction)
+    }
+
+    fn solve_pair(
+        &mut self,
+        method: Method,
+        start: Option<&Start>,
+    ) -> Result<Solution, SolveError> {
+        let interior = &self.interior;
+        let system = pair_system(self.problem, interior);
+        let guess = Guess {
+            fields: initial_pair(self.problem, interior, start),
+            contact: self.first_set(&system, start),
+            warm: start.is_some(),
+        };
+        let mut factor = PairFactor::default();
+        let mut found = run(&system, &mut FreeSolver::Pair(&mut factor), guess, method)?;
+        // Gone before the factor of sigma comes.
+        drop(factor);
+        let mut fields = std::mem::take(&mut found.fields).into_iter();
+        let displacement = [(); 2].map(|()| fields.next().unwrap_or_default());
+        let reduction = if self.reduce {
+            self.named(&found.contact, Reduction::TwoField)
+        } else {
+            Reduction::TwoField
+        };
+        self.finish(displacement, found, reduction)
+    }
+
+    /// Forces, sigma and the record.
+    fn finish(
+        &mut self,
+        displacement: [Vec<f64>; 2],
+        found: Found,
+        reduction: Reduction,
+    ) -> Result<Solution, SolveError> {
+        let force = match found.multiplier {
+            Some(force) => force,
+            None => self.forces(&displacement, &found.contact),
+        };
+        let sigma = if force.iter().all(|&z| z == 0.0) {
+            vec![0.0; self.problem.order()]
+        } else {
+            self.sigma(&force)?
+        };
+        let n = self.interior.len();
+        let info = SolveInfo {
+            solver: found.solver,
+            reduction,
+            status: found.status,
+            iterations: found.iterations,
+            unknowns: if reduction == Reduction::FullContact {
+                n
+            } else {
+                2 * n
+            },
+            kkt_residual: kkt_residual(self.problem, &displacement, &force),
+        };
+        Ok(Solution {
+            displacement,
+            force,
+            sigma,
+            contact: found.contact,
+            info,
+        })
+    }
+
+    fn take_scalar(&mut self) -> Result<ScalarFactor, SolveError> {
+        match self.scalar.take() {
+            Some(factor) => Ok(factor),
+            None => ScalarFactor::new(&self.problem.pattern, &self.interior),
+        }
+    }
+
+    /// The contact set to begin with: the start's; from nothing all vertices when the loads press everywhere and the membranes share
+    /// their boundary, else none.
+    fn first_set(&self, system: &System, start: Option<&Start>) -> Vec<bool> {
+        let mut contact = vec![false; self.problem.order()];
+        let pressed = || {
+            self.shares_boundary()
+                && self.interior.iter().all(|j| {
+                    let free = |i: usize| system.loads[i][j] / system.matrices[i].diagonal(j);
+                    if system.is_pair() {
+                        free(0) <= free(1)
+                    } else {
+                        free(0) <= 0.0
+                    }
+                })
+        };
+        let all = start.is_none() && pressed();
+        for j in self.interior.iter() {
+            contact[j] = start.map_or(all, |s| s.contact[j]);
+        }
+        contact
+    }
+
+    /// Whether the two heights are equal on the whole boundary.
+    fn shares_boundary(&self) -> bool {
+        let [g1, g2] = &self.problem.heights;
+        (0..self.problem.order()).all(|j| !self.problem.boundary[j] || g1[j] == g2[j])
+    }
+
+    /// What the contact set found says about the model: without contact, or with nothing else, no inequality was left.
+    fn named(&self, contact: &[bool], model: Reduction) -> Reduction {
+        if !contact.contains(&true) {
+            Reduction::NoContact
+        } else if self.interior.iter().all(|j| contact[j]) && self.shares_boundary() {
+            Reduction::FullContact
+        } else {
+            model
+        }
+    }
+
+    /// z on the contact set, from the row of the softer membrane; 0 elsewhere, nowhere negative.
+    fn forces(&self, displacement: &[Vec<f64>; 2], contact: &[bool]) -> Vec<f64> {
+        let problem = self.problem;
+        let mut force = vec![0.0; problem.order()];
+        for j in self.interior.iter().filter(|&j| contact[j]) {
+            let i = usize::from(problem.diagonal(1, j) < problem.diagonal(0, j));
+            let residual =
+                problem.loads[i].nodal[j] - problem.stiffness[i].row_dot(j, &displacement[i]);
+            force[j] = if i == 0 { -residual } else { residual }.max(0.0);
+        }
+        force
+    }
+
+    /// The Riesz representative: K sigma = z, zero on the boundary.
+    fn sigma(&mut self, force: &[f64]) -> Result<Vec<f64>, SolveError> {
+        let mut factor = self.take_scalar()?;
+        factor.whole(&self.problem.laplacian, Role::Laplacian, &self.interior)?;
+        let mut rhs: Vec<f64> = self.interior.iter().map(|j| force[j]).collect();
+        factor.solve(&mut rhs);
+        self.scalar = Some(factor);
+        let mut sigma = vec![0.0; self.problem.order()];
+        for (&value, j) in rhs.iter().zip(self.interior.iter()) {
+            sigma[j] = value;
+        }
+        finite("sigma", sigma)
+    }
+}
+
+/// Solves the inequality by one method.
+fn run(
+    system: &System,
+    solver: &mut FreeSolver,
+    guess: Guess,
+    method: Method,
+) -> Result<Found, SolveError> {
+    let outcome = match method {
+        Method::ActiveSet => active_set::solve(system, solver, guess)?,
+        #[cfg(test)]
+        Method::Monotone => crate::monotone::solve(system, solver, guess.fields, 0)?,
+        Method::InteriorPoint => {
+            let mut fields = guess.fields;
+            if !guess.warm {
+                // Only the size of these displacements is used.
+                let none = vec![false; guess.contact.len()];
+                active_set::step(system, solver, &mut fields, &none)?;
+                system.project(&mut fields);
+            }
+            let outcome = interior_point::solve(system, &fields)?;
+            return Ok(Found {
+                fields: outcome.fields,
+                contact: outcome.contact,
+                multiplier: Some(outcome.multiplier),
+                iterations: outcome.iterations,
+                solver: "clarabel",
+                status: outcome.status,
+            });
+        }
+    };
+    Ok(Found {
+        fields: outcome.fields,
+        contact: outcome.contact,
+        multiplier: None,
+        iterations: outcome.solves,
+        solver: if outcome.monotone {
+            "active-set+monotone"
+        } else {
+            "active-set"
+        },
+        status: outcome.status,
+    })
+}
+
+/// The mean of the displacements weighted by tension: one linear solve and a step of refinement.
+fn mean(
+    model: &Proportional,
+    interior: &Interior,
+    factor: &mut ScalarFactor,
+    start: Option<&Start>,
+) -> Result<Vec<f64>, SolveError> {
+    let mut mean = model.initial_mean(interior, start);
+    factor.whole(model.matrix, model.role, interior)?;
+    for _ in 0..2 {
+        let mut rhs: Vec<f64> = interior
+            .iter()
+            .map(|j| model.mean_load(j) - model.matrix.row_dot(j, &mean))
+            .collect();
+        factor.solve(&mut rhs);
+        for (step, j) in rhs.iter().zip(interior.iter()) {
+            mean[j] += step;
+        }
+    }
+    finite("mean displacement", mean)
+}
+
+fn finite(what: &'static str, values: Vec<f64>) -> Result<Vec<f64>, SolveError> {
+    match values.iter().position(|v| !v.is_finite()) {
+        Some(vertex) => Err(SolveError::NotFinite { what, vertex }),
+        None => Ok(values),
+    }
+}
