@@ -53,7 +53,10 @@ impl Place {
         let shown = format!("$ membranes {}", arguments.join(" "));
         let said = String::from_utf8(output.stderr).expect("text");
         assert_eq!(output.status.code(), Some(2), "{shown}\n{said}");
-        assert!(output.stdout.is_empty(), "{shown} writes to standard output");
+        assert!(
+            output.stdout.is_empty(),
+            "{shown} writes to standard output"
+        );
         assert_eq!(before, self.files(), "{shown} leaves files");
         format!("{shown}\n{}\n", said.trim_end())
     }
@@ -76,7 +79,10 @@ fn is_one_message(shown: &str) {
     assert_eq!(count("error: "), 1, "{shown}");
     match count("hint: ") {
         0 => {}
-        1 => assert!(lines.last().expect("a line").starts_with("hint: "), "{shown}"),
+        1 => assert!(
+            lines.last().expect("a line").starts_with("hint: "),
+            "{shown}"
+        ),
         _ => panic!("several hints: {shown}"),
     }
 }
@@ -108,7 +114,10 @@ fn group(group: &str, at_least: usize) {
             assert!(shown.contains("\n  --> "), "{shown}");
             // `check` says the same.
             let checked = place.refused(&["check", name]);
-            assert_eq!(shown.split_once('\n').map(|x| x.1), checked.split_once('\n').map(|x| x.1));
+            assert_eq!(
+                shown.split_once('\n').map(|x| x.1),
+                checked.split_once('\n').map(|x| x.1)
+            );
             shown
         })
         .collect();
@@ -152,11 +161,28 @@ fn meshes() {
 
 #[test]
 fn every_scene_belongs_to_a_group() {
-    let groups = ["syntax", "keys", "values", "expressions", "domain", "data", "mesh"];
+    let groups = [
+        "syntax",
+        "keys",
+        "values",
+        "expressions",
+        "domain",
+        "data",
+        "mesh",
+    ];
     for entry in fs::read_dir(bad()).expect("the folder of wrong scenes") {
-        let name = entry.expect("an entry").file_name().into_string().expect("text");
-        let known = groups.iter().any(|group| name.starts_with(&format!("{group}-")));
-        assert!(known || name.ends_with(".msh") || name == "good.toml", "{name}");
+        let name = entry
+            .expect("an entry")
+            .file_name()
+            .into_string()
+            .expect("text");
+        let known = groups
+            .iter()
+            .any(|group| name.starts_with(&format!("{group}-")));
+        assert!(
+            known || name.ends_with(".msh") || name == "good.toml",
+            "{name}"
+        );
     }
 }
 
@@ -184,7 +210,10 @@ fn overrides() {
     .map(|set| {
         let shown = place.refused(&["run", "good.toml", "--set", set]);
         is_one_message(&shown);
-        assert!(shown.contains("--set") && shown.contains("\n  --> "), "{shown}");
+        assert!(
+            shown.contains("--set") && shown.contains("\n  --> "),
+            "{shown}"
+        );
         shown
     })
     .collect();
@@ -247,6 +276,11 @@ fn the_good_scene_is_good() {
         .current_dir(place.folder.path())
         .output()
         .expect("the program starts");
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     assert_eq!(before, place.files());
 }

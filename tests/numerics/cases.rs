@@ -62,8 +62,14 @@ impl Grid {
             let phi = std::f64::consts::TAU * i as f64 / k as f64;
             [phi.cos(), phi.sin()]
         }));
-        let triangles = (0..k).map(|i| [0, 1 + i as u32, 1 + ((i + 1) % k) as u32]).collect();
-        Grid { points, triangles, circle: true }
+        let triangles = (0..k)
+            .map(|i| [0, 1 + i as u32, 1 + ((i + 1) % k) as u32])
+            .collect();
+        Grid {
+            points,
+            triangles,
+            circle: true,
+        }
     }
 
     fn squares(n: usize, keep: impl Fn(f64, f64) -> bool, cross: bool) -> Grid {
@@ -93,14 +99,25 @@ impl Grid {
                 }
             }
         }
-        Grid { points, triangles, circle: false }
+        Grid {
+            points,
+            triangles,
+            circle: false,
+        }
     }
 
     /// The grid as a mesh in the scaled lengths of a problem.
     pub fn mesh(&self, problem: &Problem) -> Mesh {
         let exponent = -problem.scale.length;
-        let points = self.points.iter().map(|p| p.map(|x| times_power_of_two(x, exponent))).collect();
-        let circle = Circle { center: [0.0, 0.0], radius: times_power_of_two(1.0, exponent) };
+        let points = self
+            .points
+            .iter()
+            .map(|p| p.map(|x| times_power_of_two(x, exponent)))
+            .collect();
+        let circle = Circle {
+            center: [0.0, 0.0],
+            radius: times_power_of_two(1.0, exponent),
+        };
         Mesh::new(points, &self.triangles, &[], self.circle.then_some(circle)).expect("a grid")
     }
 }
@@ -110,7 +127,10 @@ pub fn on(name: &str, grid: &Grid, refinements: usize) -> Problem {
     let mut problem = case(name);
     problem.mesh = grid.mesh(&problem);
     for _ in 0..refinements {
-        problem.mesh.refine_uniformly(Children::Four).expect("refines");
+        problem
+            .mesh
+            .refine_uniformly(Children::Four)
+            .expect("refines");
     }
     problem
 }
@@ -118,9 +138,15 @@ pub fn on(name: &str, grid: &Grid, refinements: usize) -> Problem {
 /// Both estimators, no files, `levels` levels of uniform refinement.
 pub fn uniform(levels: usize) -> Settings {
     let mut settings = Settings::default();
-    settings.estimate = Estimate { estimator: Estimator::Residual, also: vec![Estimator::Paper] };
+    settings.estimate = Estimate {
+        estimator: Estimator::Residual,
+        also: vec![Estimator::Paper],
+    };
     settings.mark.strategy = Strategy::Uniform;
-    settings.stop = Stop { levels: Some(levels), ..Stop::default() };
+    settings.stop = Stop {
+        levels: Some(levels),
+        ..Stop::default()
+    };
     settings
 }
 
@@ -128,7 +154,11 @@ pub fn uniform(levels: usize) -> Settings {
 pub fn levels(problem: &Problem, settings: &Settings) -> Vec<Level> {
     struct Keep(Vec<Level>);
     impl Observer for Keep {
-        fn level(&mut self, level: &Level, _: Option<Reason>) -> Result<(), adapt::output::OutputError> {
+        fn level(
+            &mut self,
+            level: &Level,
+            _: Option<Reason>,
+        ) -> Result<(), adapt::output::OutputError> {
             self.0.push(level.clone());
             Ok(())
         }
@@ -142,7 +172,11 @@ pub fn levels(problem: &Problem, settings: &Settings) -> Vec<Level> {
 pub fn last(problem: &Problem, settings: &Settings) -> Outcome {
     struct Blind;
     impl Observer for Blind {
-        fn level(&mut self, _: &Level, _: Option<Reason>) -> Result<(), adapt::output::OutputError> {
+        fn level(
+            &mut self,
+            _: &Level,
+            _: Option<Reason>,
+        ) -> Result<(), adapt::output::OutputError> {
             Ok(())
         }
     }

@@ -27,7 +27,13 @@ fn rescaled(name: &str, domain: &str, a: i32, k: i32, l: i32) -> scene::Scene {
     let text = std::fs::read_to_string(configs().join(format!("{name}.toml"))).expect("a scene");
     let power = |e: i32| format!("{:e}", times_power_of_two(1.0, e));
     let mut result = String::new();
-    let parameters = [("L", a), ("M", 2 * k), ("F", l), ("U", l + 2 * a - 2 * k), ("G", l + 2 * a)];
+    let parameters = [
+        ("L", a),
+        ("M", 2 * k),
+        ("F", l),
+        ("U", l + 2 * a - 2 * k),
+        ("G", l + 2 * a),
+    ];
     let mut section = "";
     for line in text.lines() {
         if line.starts_with('[') {
@@ -37,7 +43,9 @@ fn rescaled(name: &str, domain: &str, a: i32, k: i32, l: i32) -> scene::Scene {
                 "[upper]" => {
                     let own = if name == "disk" { "g = 0.05\n" } else { "" };
                     result.push_str(&format!("[parameters]\n{own}"));
-                    parameters.iter().for_each(|(p, e)| result.push_str(&format!("{p} = {}\n", power(*e))));
+                    parameters
+                        .iter()
+                        .for_each(|(p, e)| result.push_str(&format!("{p} = {}\n", power(*e))));
                 }
                 s if s.starts_with("[domain") => {
                     result.push_str(domain);
@@ -56,7 +64,10 @@ fn rescaled(name: &str, domain: &str, a: i32, k: i32, l: i32) -> scene::Scene {
             ("[exact]", "sigma") => Some("G"),
             _ => None,
         };
-        match line.split_once(" = ").map(|(key, value)| (key, value, unit(key))) {
+        match line
+            .split_once(" = ")
+            .map(|(key, value)| (key, value, unit(key)))
+        {
             Some((key, value, Some(unit))) => {
                 let value = over_length(value.trim_matches('"'));
                 result.push_str(&format!("{key} = \"{unit}*({value})\"\n"));
@@ -69,7 +80,10 @@ fn rescaled(name: &str, domain: &str, a: i32, k: i32, l: i32) -> scene::Scene {
 
 fn run(scene: &scene::Scene) -> Vec<Level> {
     let mut settings = scene.settings.clone();
-    settings.stop = Stop { vertices: Some(1500), ..Stop::default() };
+    settings.stop = Stop {
+        vertices: Some(1500),
+        ..Stop::default()
+    };
     settings.output.fields = Fields::None;
     levels(&scene.problem, &settings)
 }
@@ -83,20 +97,45 @@ fn same_bits(what: &str, a: &[f64], b: &[f64]) {
 
 fn same_level(what: &str, a: &Level, b: &Level) {
     for i in 0..2 {
-        same_bits(&format!("{what} u{}", i + 1), &a.solution.displacement[i], &b.solution.displacement[i]);
+        same_bits(
+            &format!("{what} u{}", i + 1),
+            &a.solution.displacement[i],
+            &b.solution.displacement[i],
+        );
     }
     same_bits(&format!("{what} z"), &a.solution.force, &b.solution.force);
-    same_bits(&format!("{what} sigma"), &a.solution.sigma, &b.solution.sigma);
+    same_bits(
+        &format!("{what} sigma"),
+        &a.solution.sigma,
+        &b.solution.sigma,
+    );
     assert_eq!(a.solution.contact, b.solution.contact, "{what}");
-    let (p, q) = (a.estimates.paper.as_ref().expect("paper"), b.estimates.paper.as_ref().expect("paper"));
+    let (p, q) = (
+        a.estimates.paper.as_ref().expect("paper"),
+        b.estimates.paper.as_ref().expect("paper"),
+    );
     same_bits(&format!("{what} eta_K"), &p.eta_k, &q.eta_k);
     same_bits(&format!("{what} eta_e"), &p.eta_e, &q.eta_e);
-    let (p, q) = (a.estimates.residual.as_ref().expect("residual"), b.estimates.residual.as_ref().expect("residual"));
+    let (p, q) = (
+        a.estimates.residual.as_ref().expect("residual"),
+        b.estimates.residual.as_ref().expect("residual"),
+    );
     same_bits(&format!("{what} residual"), p, q);
-    let (p, q) = (a.estimates.errors.as_ref().expect("exact"), b.estimates.errors.as_ref().expect("exact"));
-    same_bits(&format!("{what} error"), &p.energy_squared, &q.energy_squared);
+    let (p, q) = (
+        a.estimates.errors.as_ref().expect("exact"),
+        b.estimates.errors.as_ref().expect("exact"),
+    );
+    same_bits(
+        &format!("{what} error"),
+        &p.energy_squared,
+        &q.energy_squared,
+    );
     for i in 0..2 {
-        same_bits(&format!("{what} H1 error"), &p.displacement_squared[i], &q.displacement_squared[i]);
+        same_bits(
+            &format!("{what} H1 error"),
+            &p.displacement_squared[i],
+            &q.displacement_squared[i],
+        );
     }
 }
 
@@ -124,7 +163,10 @@ fn same_record(what: &str, plain: &LevelRecord, other: &LevelRecord, by: Scale) 
     for (n, ((a, exponent), (b, _))) in pairs(plain).into_iter().zip(pairs(other)).enumerate() {
         let expected = a.map(|a| times_power_of_two(a, exponent));
         let representable = expected.is_none_or(|e| e == 0.0 || e.is_normal());
-        assert!(!representable || expected == b, "{what} number {n}: {a:?} {exponent} {b:?}");
+        assert!(
+            !representable || expected == b,
+            "{what} number {n}: {a:?} {exponent} {b:?}"
+        );
     }
     assert_eq!(plain.kkt_residual, other.kkt_residual, "{what}");
 }
@@ -139,7 +181,11 @@ fn covariant(name: &str, domain: impl Fn(f64) -> String) {
             for l in [-300, 7, 300] {
                 let what = format!("{name} 2^{a} 4^{k} 2^{l}");
                 let other = rescaled(name, &domain(times_power_of_two(1.0, a)), a, k, l);
-                let by = Scale { length: a, tension: 2 * k, load: l };
+                let by = Scale {
+                    length: a,
+                    tension: 2 * k,
+                    load: l,
+                };
                 let t = other.problem.scale;
                 assert_eq!(
                     (t.length, t.tension, t.load),
@@ -150,7 +196,12 @@ fn covariant(name: &str, domain: impl Fn(f64) -> String) {
                 assert_eq!(found.len(), reference.len(), "{what}");
                 for (x, y) in reference.iter().zip(&found) {
                     same_level(&format!("{what} level {}", x.number), x, y);
-                    same_record(&format!("{what} level {}", x.number), &x.record, &y.record, by);
+                    same_record(
+                        &format!("{what} level {}", x.number),
+                        &x.record,
+                        &y.record,
+                        by,
+                    );
                 }
                 tried += 1;
             }
@@ -162,14 +213,20 @@ fn covariant(name: &str, domain: impl Fn(f64) -> String) {
 #[test]
 fn disk() {
     covariant("disk", |l| {
-        format!("[domain.disk]\ncenter = [0.0, 0.0]\nradius = {l:e}\nsize = {:e}\n", 0.25 * l)
+        format!(
+            "[domain.disk]\ncenter = [0.0, 0.0]\nradius = {l:e}\nsize = {:e}\n",
+            0.25 * l
+        )
     });
 }
 
 #[test]
 fn square() {
     covariant("square", |l| {
-        format!("[domain.rectangle]\nlower = [-{l:e}, -{l:e}]\nupper = [{l:e}, {l:e}]\nsize = {:e}\n", 0.25 * l)
+        format!(
+            "[domain.rectangle]\nlower = [-{l:e}, -{l:e}]\nupper = [{l:e}, {l:e}]\nsize = {:e}\n",
+            0.25 * l
+        )
     });
 }
 

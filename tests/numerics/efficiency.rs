@@ -25,7 +25,10 @@ fn measure(name: &str, grid: &Grid, refinements: usize) -> Measured {
     let physical = fem_core::scale::times_power_of_two;
     let total = (physical(errors.h1_total, u).powi(2) + physical(sigma, s).powi(2)).sqrt();
     let efficiency = estimate::efficiency(&level.mesh, &level.discrete, paper, errors);
-    assert_eq!(u, s, "{name}: the constants of (7.13) are read in scaled units");
+    assert_eq!(
+        u, s,
+        "{name}: the constants of (7.13) are read in scaled units"
+    );
     Measured {
         vertices: level.mesh.vertex_count(),
         paper: physical(paper.eta_k_total(), s) / total,
@@ -36,17 +39,36 @@ fn measure(name: &str, grid: &Grid, refinements: usize) -> Measured {
 }
 
 /// Measures a family of grids and holds every value within 1 % of the committed one.
-fn hold(name: &str, grids: &[(Grid, usize)], committed: &[[f64; 4]], range: std::ops::RangeInclusive<f64>) {
+fn hold(
+    name: &str,
+    grids: &[(Grid, usize)],
+    committed: &[[f64; 4]],
+    range: std::ops::RangeInclusive<f64>,
+) {
     let mut broken = Vec::new();
     for ((grid, refinements), committed) in grids.iter().zip(committed) {
         let m = measure(name, grid, *refinements);
         let found = [m.paper, m.residual, m.element, m.edge];
         println!("{name} {}: {found:.4?}", m.vertices);
         assert!(m.vertices >= 200);
-        assert!(range.contains(&m.paper), "{name} {}: eta_K over error {}", m.vertices, m.paper);
-        assert!(m.element <= 14.0, "{name} {}: (7.13) {}", m.vertices, m.element);
+        assert!(
+            range.contains(&m.paper),
+            "{name} {}: eta_K over error {}",
+            m.vertices,
+            m.paper
+        );
+        assert!(
+            m.element <= 14.0,
+            "{name} {}: (7.13) {}",
+            m.vertices,
+            m.element
+        );
         assert!(m.edge <= 4.5, "{name} {}: (7.14) {}", m.vertices, m.edge);
-        if found.iter().zip(committed).any(|(f, c)| (f / c - 1.0).abs() > 0.01) {
+        if found
+            .iter()
+            .zip(committed)
+            .any(|(f, c)| (f / c - 1.0).abs() > 0.01)
+        {
             broken.push((m.vertices, found, *committed));
         }
     }
@@ -59,19 +81,30 @@ fn p1_disk() {
     hold("P1", &grids, &P1, 8.4..=9.7);
     for (grid, l) in &grids {
         let m = measure("P1", grid, *l);
-        assert!((3.7..=4.3).contains(&m.residual), "{} {}", m.vertices, m.residual);
+        assert!(
+            (3.7..=4.3).contains(&m.residual),
+            "{} {}",
+            m.vertices,
+            m.residual
+        );
     }
 }
 
 #[test]
 fn p2_right() {
-    let grids: Vec<_> = [16, 32, 64, 128].map(|n| (Grid::right(n), 0)).into_iter().collect();
+    let grids: Vec<_> = [16, 32, 64, 128]
+        .map(|n| (Grid::right(n), 0))
+        .into_iter()
+        .collect();
     hold("P2", &grids, &P2, 18.0..=21.0);
 }
 
 #[test]
 fn p6c_right() {
-    let grids: Vec<_> = [16, 32, 64, 128].map(|n| (Grid::right(n), 0)).into_iter().collect();
+    let grids: Vec<_> = [16, 32, 64, 128]
+        .map(|n| (Grid::right(n), 0))
+        .into_iter()
+        .collect();
     hold("P6c", &grids, &P6C, 27.0..=29.0);
 }
 
@@ -103,7 +136,15 @@ fn residual_over_energy_error() {
 /// The second term of (7.11) does not converge: the plain sum of eta_e tends to a constant that the mesh family decides.
 #[test]
 fn the_sum_of_edge_indicators_stagnates() {
-    let sums: Vec<f64> = [64, 128, 256].iter().map(|&n| solve(&on("P2", &Grid::right(n), 0)).record.eta_e_sum.expect("asked for")).collect();
+    let sums: Vec<f64> = [64, 128, 256]
+        .iter()
+        .map(|&n| {
+            solve(&on("P2", &Grid::right(n), 0))
+                .record
+                .eta_e_sum
+                .expect("asked for")
+        })
+        .collect();
     println!("sum of eta_e: {sums:.4?}");
     assert!((sums[2] / 3.796 - 1.0).abs() < 0.01, "{sums:?}");
     assert!(sums[0] < sums[1] && sums[1] < sums[2]);

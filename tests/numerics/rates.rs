@@ -1,7 +1,7 @@
 //! Rates of convergence: first order in h on uniform meshes, N^(-1/2) with adaptivity where a corner spoils it.
 
-use adapt::settings::{Estimate, Estimator, Stop, Strategy};
 use adapt::Settings;
+use adapt::settings::{Estimate, Estimator, Stop, Strategy};
 
 use crate::cases::{Grid, levels, on, uniform};
 
@@ -11,8 +11,13 @@ fn orders(name: &str, grid: &Grid, count: usize) -> [Option<f64>; 3] {
     let mut settings = uniform(count);
     settings.estimate.also.clear();
     let levels = levels(&problem, &settings);
-    let errors: Vec<_> = levels.iter().filter_map(|l| l.estimates.errors.as_ref()).collect();
-    let [.., coarse, fine] = errors[..] else { panic!("{name}: no exact solution") };
+    let errors: Vec<_> = levels
+        .iter()
+        .filter_map(|l| l.estimates.errors.as_ref())
+        .collect();
+    let [.., coarse, fine] = errors[..] else {
+        panic!("{name}: no exact solution")
+    };
     let vertices = levels[levels.len() - 1].mesh.vertex_count();
     assert!(vertices >= 100_000, "{name}: only {vertices} vertices");
     let order = |a: f64, b: f64| (a / b).log2();
@@ -27,7 +32,10 @@ fn orders(name: &str, grid: &Grid, count: usize) -> [Option<f64>; 3] {
 
 fn assert_first_order(name: &str, grid: &Grid, count: usize, with_sigma: bool) {
     let orders = orders(name, grid, count);
-    assert!(!with_sigma || orders[2].is_some(), "{name}: sigma is not known");
+    assert!(
+        !with_sigma || orders[2].is_some(),
+        "{name}: sigma is not known"
+    );
     for order in orders.iter().take(if with_sigma { 3 } else { 2 }).flatten() {
         assert!((0.97..=1.03).contains(order), "{name}: {orders:?}");
     }
@@ -71,11 +79,18 @@ fn p7c_and_p8_with_discontinuous_action() {
 
 /// Slope of log error against log vertices, least squares over the levels with at least `from` vertices.
 fn slope(points: &[(usize, f64)], from: usize) -> f64 {
-    let logs: Vec<_> =
-        points.iter().filter(|p| p.0 >= from).map(|&(n, e)| ((n as f64).ln(), e.ln())).collect();
+    let logs: Vec<_> = points
+        .iter()
+        .filter(|p| p.0 >= from)
+        .map(|&(n, e)| ((n as f64).ln(), e.ln()))
+        .collect();
     let n = logs.len() as f64;
-    let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
-    logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>() / logs.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>()
+    let (mx, my) = (
+        logs.iter().map(|p| p.0).sum::<f64>() / n,
+        logs.iter().map(|p| p.1).sum::<f64>() / n,
+    );
+    logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
+        / logs.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>()
 }
 
 #[test]
@@ -84,11 +99,22 @@ fn adaptivity_restores_the_rate_at_a_corner() {
     let run = |strategy, estimator| {
         let mut settings = Settings::default();
         settings.mark.strategy = strategy;
-        settings.estimate = Estimate { estimator, also: vec![] };
-        settings.stop = Stop { vertices: Some(40_000), ..Stop::default() };
+        settings.estimate = Estimate {
+            estimator,
+            also: vec![],
+        };
+        settings.stop = Stop {
+            vertices: Some(40_000),
+            ..Stop::default()
+        };
         let points: Vec<_> = levels(&problem, &settings)
             .iter()
-            .map(|l| (l.mesh.vertex_count(), l.estimates.errors.as_ref().expect("exact").energy))
+            .map(|l| {
+                (
+                    l.mesh.vertex_count(),
+                    l.estimates.errors.as_ref().expect("exact").energy,
+                )
+            })
             .collect();
         slope(&points, 500)
     };

@@ -13,24 +13,52 @@ bound_711_repaired,h1_error,contact_force,max_action,contact_area_error,contact_
 
 #[test]
 fn a_run_leaves_the_files_of_the_contract_and_one_line() {
-    let run = run(&config("disk"), &["--set", "output.fields=\"all\"", "--set", "output.edges=true"]);
+    let run = run(
+        &config("disk"),
+        &[
+            "--set",
+            "output.fields=\"all\"",
+            "--set",
+            "output.edges=true",
+        ],
+    );
     assert_eq!(run.code, 0, "{}", run.stderr);
     assert_eq!(run.stdout.trim().lines().count(), 1, "{}", run.stdout);
-    for word in ["bound", "contact area", "contact force", "largest pressure", "smallest gap"] {
+    for word in [
+        "bound",
+        "contact area",
+        "contact force",
+        "largest pressure",
+        "smallest gap",
+    ] {
         assert!(run.stdout.contains(word), "no {word}: {}", run.stdout);
     }
     let levels = run.summary()["levels"].as_u64().expect("a count") as usize;
     // A header and one line a level.
-    assert_eq!(run.stderr.trim().lines().count(), levels + 1, "{}", run.stderr);
+    assert_eq!(
+        run.stderr.trim().lines().count(),
+        levels + 1,
+        "{}",
+        run.stderr
+    );
     let mut names: Vec<_> = fs::read_dir(&run.out)
         .expect("the folder")
-        .map(|e| e.expect("an entry").file_name().into_string().expect("text"))
+        .map(|e| {
+            e.expect("an entry")
+                .file_name()
+                .into_string()
+                .expect("text")
+        })
         .collect();
     names.sort();
     let mut expected: Vec<String> = (0..levels).map(|l| format!("edges_{l:04}.vtp")).collect();
     expected.push("history.csv".into());
     expected.extend((0..levels).map(|l| format!("level_{l:04}.vtu")));
-    expected.extend(["scene.toml".into(), "series.pvd".into(), "summary.json".into()]);
+    expected.extend([
+        "scene.toml".into(),
+        "series.pvd".into(),
+        "summary.json".into(),
+    ]);
     assert_eq!(names, expected);
     let history = fs::read_to_string(run.out.join("history.csv")).expect("a history");
     assert_eq!(history.lines().next(), Some(HISTORY));
@@ -48,12 +76,23 @@ fn a_run_leaves_the_files_of_the_contract_and_one_line() {
 
 #[test]
 fn the_same_scene_gives_the_same_bytes() {
-    let arguments = ["--set", "output.edges=true", "--set", "stop.relative_error=0.1"];
-    let (a, b) = (run(&config("two-diaphragms"), &arguments), run(&config("two-diaphragms"), &arguments));
+    let arguments = [
+        "--set",
+        "output.edges=true",
+        "--set",
+        "stop.relative_error=0.1",
+    ];
+    let (a, b) = (
+        run(&config("two-diaphragms"), &arguments),
+        run(&config("two-diaphragms"), &arguments),
+    );
     let mut compared = 0;
     for entry in fs::read_dir(&a.out).expect("the folder") {
         let name = entry.expect("an entry").file_name();
-        let (x, y) = (fs::read(a.out.join(&name)).expect("a file"), fs::read(b.out.join(&name)).expect("a file"));
+        let (x, y) = (
+            fs::read(a.out.join(&name)).expect("a file"),
+            fs::read(b.out.join(&name)).expect("a file"),
+        );
         let text = name.to_string_lossy();
         if !["summary.json", "history.csv"].contains(&&*text) {
             assert!(x == y, "{text} differs");
@@ -61,8 +100,16 @@ fn the_same_scene_gives_the_same_bytes() {
         }
     }
     assert_eq!(compared, 4);
-    for (x, y) in a.history().iter().flatten().zip(b.history().iter().flatten()) {
-        assert!(x == y || x.0.starts_with("seconds_") || x.0 == "peak_memory_mb", "{x:?} {y:?}");
+    for (x, y) in a
+        .history()
+        .iter()
+        .flatten()
+        .zip(b.history().iter().flatten())
+    {
+        assert!(
+            x == y || x.0.starts_with("seconds_") || x.0 == "peak_memory_mb",
+            "{x:?} {y:?}"
+        );
     }
     // The scene as it was run is itself a scene that gives the same.
     let again = run(&a.out.join("scene.toml"), &[]);
@@ -75,20 +122,45 @@ fn stopping_rules_and_exit_codes() {
     let code = |arguments: &[&str]| {
         let run = run(&config("square"), arguments);
         let summary = run.summary();
-        (run.code, summary["outcome"].as_str().expect("text").to_owned(), summary["stopped_by"].as_str().expect("text").to_owned())
+        (
+            run.code,
+            summary["outcome"].as_str().expect("text").to_owned(),
+            summary["stopped_by"].as_str().expect("text").to_owned(),
+        )
     };
     assert_eq!(code(&[]), (0, "goal".into(), "relative_error".into()));
-    assert_eq!(code(&["--set", "stop.levels=3"]), (5, "limit".into(), "levels".into()));
-    assert_eq!(code(&["--set", "stop.vertices=300"]), (5, "limit".into(), "vertices".into()));
-    assert_eq!(code(&["--set", "stop.seconds=1e-9"]), (5, "limit".into(), "seconds".into()));
-    assert_eq!(code(&["--set", "stop.error=1.0"]), (0, "goal".into(), "error".into()));
+    assert_eq!(
+        code(&["--set", "stop.levels=3"]),
+        (5, "limit".into(), "levels".into())
+    );
+    assert_eq!(
+        code(&["--set", "stop.vertices=300"]),
+        (5, "limit".into(), "vertices".into())
+    );
+    assert_eq!(
+        code(&["--set", "stop.seconds=1e-9"]),
+        (5, "limit".into(), "seconds".into())
+    );
+    assert_eq!(
+        code(&["--set", "stop.error=1.0"]),
+        (0, "goal".into(), "error".into())
+    );
     // Without an accuracy goal a limit is what was asked for.
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scene = folder.path().join("limit.toml");
     let text = fs::read_to_string(config("square")).expect("a scene");
-    fs::write(&scene, text.replace("relative_error = 0.05\nvertices = 100_000", "levels = 2")).expect("written");
+    fs::write(
+        &scene,
+        text.replace("relative_error = 0.05\nvertices = 100_000", "levels = 2"),
+    )
+    .expect("written");
     let limited = run(&scene, &[]);
-    assert_eq!((limited.code, limited.summary()["outcome"].as_str()), (0, Some("limit")), "{}", limited.stderr);
+    assert_eq!(
+        (limited.code, limited.summary()["outcome"].as_str()),
+        (0, Some("limit")),
+        "{}",
+        limited.stderr
+    );
     assert_eq!(limited.summary()["levels"], 2);
 }
 
@@ -106,7 +178,15 @@ fn a_zero_solution_ends_the_run() {
 
 #[test]
 fn estimators_that_were_not_asked_for_leave_no_trace() {
-    let run = run(&config("no-contact"), &["--set", "estimate.also=[]", "--set", "stop.relative_error=0.2"]);
+    let run = run(
+        &config("no-contact"),
+        &[
+            "--set",
+            "estimate.also=[]",
+            "--set",
+            "stop.relative_error=0.2",
+        ],
+    );
     assert_eq!(run.code, 0, "{}", run.stderr);
     let summary = run.summary();
     assert!(summary["eta_K"].is_null() && summary["eta_e_sum"].is_null());
@@ -117,12 +197,24 @@ fn estimators_that_were_not_asked_for_leave_no_trace() {
         .find(|p| p.extension().is_some_and(|e| e == "vtu"))
         .map(|p| fs::read_to_string(p).expect("text"))
         .expect("a .vtu");
-    assert!(!text.contains("\"eta_K\"") && text.contains("\"residual\"") && !text.contains("\"certified\""));
+    assert!(
+        !text.contains("\"eta_K\"")
+            && text.contains("\"residual\"")
+            && !text.contains("\"certified\"")
+    );
 }
 
 #[test]
 fn the_paper_estimator_can_drive() {
-    let run = run(&config("square"), &["--set", "estimate.estimator=\"paper\"", "--set", "stop.relative_error=0.5"]);
+    let run = run(
+        &config("square"),
+        &[
+            "--set",
+            "estimate.estimator=\"paper\"",
+            "--set",
+            "stop.relative_error=0.5",
+        ],
+    );
     assert_eq!(run.code, 0, "{}", run.stderr);
     let s = run.summary();
     let value = |key: &str| s[key].as_f64().unwrap_or_else(|| panic!("no {key}"));
@@ -133,18 +225,39 @@ fn the_paper_estimator_can_drive() {
 
 #[test]
 fn a_folder_that_is_not_empty_is_kept_unless_forced() {
-    let first = run(&config("square"), &["--set", "stop.levels=2", "--set", "output.fields=\"all\""]);
+    let first = run(
+        &config("square"),
+        &["--set", "stop.levels=2", "--set", "output.fields=\"all\""],
+    );
     fs::write(first.out.join("notes.txt"), "mine").expect("written");
     let out = first.out.to_str().expect("a path");
     let scene = config("square");
-    let arguments = ["run", scene.to_str().expect("a path"), "--out", out, "--set", "stop.levels=1"];
+    let arguments = [
+        "run",
+        scene.to_str().expect("a path"),
+        "--out",
+        out,
+        "--set",
+        "stop.levels=1",
+    ];
     let refused = membranes(&arguments);
     assert_eq!(refused.status.code(), Some(2));
     assert!(first.out.join("level_0001.vtu").exists());
     let forced = membranes(&[&arguments[..], &["--force"]].concat());
-    assert_eq!(forced.status.code(), Some(5), "{}", String::from_utf8_lossy(&forced.stderr));
-    assert!(!first.out.join("level_0001.vtu").exists(), "a level of the older run is left");
-    assert_eq!(fs::read_to_string(first.out.join("notes.txt")).expect("kept"), "mine");
+    assert_eq!(
+        forced.status.code(),
+        Some(5),
+        "{}",
+        String::from_utf8_lossy(&forced.stderr)
+    );
+    assert!(
+        !first.out.join("level_0001.vtu").exists(),
+        "a level of the older run is left"
+    );
+    assert_eq!(
+        fs::read_to_string(first.out.join("notes.txt")).expect("kept"),
+        "mine"
+    );
 }
 
 #[test]
@@ -154,14 +267,31 @@ fn a_folder_that_cannot_be_written_is_exit_code_4() {
     fs::write(&file, "").expect("written");
     let out = file.join("below");
     let scene = config("no-contact");
-    let result = membranes(&["run", scene.to_str().expect("a path"), "--out", out.to_str().expect("a path")]);
-    assert!(matches!(result.status.code(), Some(2 | 4)), "{:?}", result.status);
-    assert_eq!(String::from_utf8_lossy(&result.stderr).matches("error:").count(), 1);
+    let result = membranes(&[
+        "run",
+        scene.to_str().expect("a path"),
+        "--out",
+        out.to_str().expect("a path"),
+    ]);
+    assert!(
+        matches!(result.status.code(), Some(2 | 4)),
+        "{:?}",
+        result.status
+    );
+    assert_eq!(
+        String::from_utf8_lossy(&result.stderr)
+            .matches("error:")
+            .count(),
+        1
+    );
 }
 
 #[test]
 fn quiet_and_json() {
-    let quiet = run(&config("no-contact"), &["--quiet", "--json", "--set", "stop.relative_error=0.2"]);
+    let quiet = run(
+        &config("no-contact"),
+        &["--quiet", "--json", "--set", "stop.relative_error=0.2"],
+    );
     assert_eq!(quiet.stderr, "");
     let object: Value = serde_json::from_str(&quiet.stdout).expect("one JSON object");
     assert_eq!(object["outcome"], "goal");
@@ -172,7 +302,13 @@ fn quiet_and_json() {
 fn check_says_what_will_be_modelled_and_writes_nothing() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_membranes"))
-        .args(["check", fs::canonicalize(config("two-diaphragms")).expect("a path").to_str().expect("a path")])
+        .args([
+            "check",
+            fs::canonicalize(config("two-diaphragms"))
+                .expect("a path")
+                .to_str()
+                .expect("a path"),
+        ])
         .current_dir(folder.path())
         .output()
         .expect("starts");
@@ -188,7 +324,10 @@ fn check_says_what_will_be_modelled_and_writes_nothing() {
 fn version() {
     let output = membranes(&["--version"]);
     assert_eq!(output.status.code(), Some(0));
-    assert_eq!(String::from_utf8_lossy(&output.stdout), format!("membranes {}\n", env!("CARGO_PKG_VERSION")));
+    assert_eq!(
+        String::from_utf8_lossy(&output.stdout),
+        format!("membranes {}\n", env!("CARGO_PKG_VERSION"))
+    );
 }
 
 #[test]

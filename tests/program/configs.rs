@@ -61,12 +61,17 @@ const KNOWN: [Known; 6] = [
 ];
 
 fn number(run: &Run, key: &str) -> f64 {
-    run.summary()[key].as_f64().unwrap_or_else(|| panic!("no number `{key}`"))
+    run.summary()[key]
+        .as_f64()
+        .unwrap_or_else(|| panic!("no number `{key}`"))
 }
 
 fn near(what: &str, found: f64, (exact, relative): (f64, f64)) {
     println!("{what}: {found} against {exact}");
-    assert!((found - exact).abs() <= relative * exact.abs(), "{what}: {found} against {exact}");
+    assert!(
+        (found - exact).abs() <= relative * exact.abs(),
+        "{what}: {found} against {exact}"
+    );
 }
 
 #[test]
@@ -83,7 +88,11 @@ fn scenes_with_known_solutions() {
             near(&format!("{name} area"), number(&run, "contact_area"), area);
         }
         if let Some(force) = known.force {
-            near(&format!("{name} force"), number(&run, "contact_force"), force);
+            near(
+                &format!("{name} force"),
+                number(&run, "contact_force"),
+                force,
+            );
         }
         if let Some((low, high)) = known.effectivity {
             let effectivity = number(&run, "effectivity");
@@ -103,8 +112,16 @@ fn two_diaphragms_under_pressure() {
     assert_eq!(summary["outcome"], "goal");
     assert_eq!(summary["reduction"], "two-field");
     // No closed solution: the numbers are those of the same scene at a goal of 2 % (`--set stop.relative_error=0.02`).
-    near("contact area", number(&run, "contact_area"), (FINE_AREA, 0.05));
-    near("contact force", number(&run, "contact_force"), (FINE_FORCE, 0.02));
+    near(
+        "contact area",
+        number(&run, "contact_area"),
+        (FINE_AREA, 0.05),
+    );
+    near(
+        "contact force",
+        number(&run, "contact_force"),
+        (FINE_FORCE, 0.02),
+    );
     assert!(number(&run, "smallest_gap") >= 0.0);
     // Balance: the diaphragms cannot push each other harder than the pressure pushes the upper one.
     assert!(number(&run, "max_action") > 0.0);

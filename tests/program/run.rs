@@ -24,8 +24,21 @@ impl Run {
     pub fn history(&self) -> Vec<Vec<(String, String)>> {
         let text = std::fs::read_to_string(self.out.join("history.csv")).expect("a history");
         let mut lines = text.lines();
-        let names: Vec<String> = lines.next().expect("a header").split(',').map(str::to_owned).collect();
-        lines.map(|l| names.iter().cloned().zip(l.split(',').map(str::to_owned)).collect()).collect()
+        let names: Vec<String> = lines
+            .next()
+            .expect("a header")
+            .split(',')
+            .map(str::to_owned)
+            .collect();
+        lines
+            .map(|l| {
+                names
+                    .iter()
+                    .cloned()
+                    .zip(l.split(',').map(str::to_owned))
+                    .collect()
+            })
+            .collect()
     }
 }
 
@@ -35,14 +48,22 @@ pub fn config(name: &str) -> PathBuf {
 
 /// The binary itself.
 pub fn membranes(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_membranes")).args(arguments).output().expect("the program starts")
+    Command::new(env!("CARGO_BIN_EXE_membranes"))
+        .args(arguments)
+        .output()
+        .expect("the program starts")
 }
 
 /// `membranes run SCENE --out ... ARGUMENTS`.
 pub fn run(scene: &Path, arguments: &[&str]) -> Run {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = folder.path().join("out");
-    let mut all = vec!["run", scene.to_str().expect("a path"), "--out", out.to_str().expect("a path")];
+    let mut all = vec![
+        "run",
+        scene.to_str().expect("a path"),
+        "--out",
+        out.to_str().expect("a path"),
+    ];
     all.extend(arguments);
     let output = membranes(&all);
     Run {

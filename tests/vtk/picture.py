@@ -5,8 +5,8 @@
 
 Left: the two membranes as surfaces, the upper one transparent, the mesh on them and the contact set. Right: the mesh
 from above, the action as colour, the contact set outlined. Needs no screen: on Linux without a display the picture is
-drawn through EGL, which Mesa also offers in software (packages `libegl1`, `libgl1-mesa-dri`); where that is missing, set
-VTK_DEFAULT_OPENGL_WINDOW=vtkOSOpenGLRenderWindow and install OSMesa. Needs Python 3.9 and the package `vtk`.
+drawn through EGL, which Mesa also offers in software (packages `libegl1`, `libgl1-mesa-dri`); where that is missing,
+set VTK_DEFAULT_OPENGL_WINDOW=vtkOSOpenGLRenderWindow and install OSMesa. Needs Python 3.9 and the package `vtk`.
 """
 
 import math
@@ -158,11 +158,12 @@ class Scene:
         camera.SetFocalPoint(0, 0, 0)
         fit(renderer, [surface], (-0.93, 0.66), (-0.83, 0.78))
         title(renderer, "Action and contact set")
-        renderer.AddViewProp(colour_bar(colours))
-        text_at(renderer, "action", 0.875, 0.805, 17, INK)
+        if largest > 0:
+            renderer.AddViewProp(colour_bar(colours))
+            text_at(renderer, "action", 0.875, 0.805, 17, INK)
         level = self.field("level")
         bound = self.field("error_bound")
-        facts = [f"action up to {largest:.3g}"]
+        facts = [f"action up to {largest:.3g}" if largest > 0 else "no contact"]
         if level is not None:
             facts.append(f"level {level:g}")
         if bound is not None:
@@ -229,9 +230,9 @@ class Scene:
 
 def in_contact(data):
     """The part of surfaces or lines inside the outline of the contact set."""
+    data.GetPointData().SetActiveScalars("contact")  # the filter takes no name
     clip = vtkClipPolyData()
     clip.SetInputData(data)
-    clip.SetInputArrayToProcess(0, 0, 0, vtkDataObject.FIELD_ASSOCIATION_POINTS, "contact")
     clip.SetValue(0.5)
     clip.Update()
     return clip.GetOutput()

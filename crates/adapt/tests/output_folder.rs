@@ -68,7 +68,10 @@ fn a_file_is_no_folder_with_or_without_force() {
     fs::write(&file, "mine").unwrap();
     for force in [false, true] {
         let error = RunFolder::prepare(&file, force).unwrap_err();
-        assert!(matches!(error, OutputError::NotADirectory { .. }), "{error}");
+        assert!(
+            matches!(error, OutputError::NotADirectory { .. }),
+            "{error}"
+        );
         assert!(error.is_user_error());
     }
     assert_eq!(fs::read_to_string(file).unwrap(), "mine");
@@ -152,7 +155,13 @@ fn a_folder_in_the_place_of_a_file_is_an_error_without_trace() {
     let path = folder.path().join("history.csv");
     fs::create_dir(&path).unwrap();
     let error = write_whole(&path, |writer| writer.write_all(b"new")).unwrap_err();
-    assert!(matches!(error, OutputError::Io { action: "write", .. }));
+    assert!(matches!(
+        error,
+        OutputError::Io {
+            action: "write",
+            ..
+        }
+    ));
     assert_eq!(entries(folder.path()), ["history.csv"]);
 }
 

@@ -148,7 +148,12 @@ fn a_number_that_json_cannot_hold_is_null_and_named() {
     assert_eq!(object["true_error"], Value::Null);
     assert_eq!(
         object["not_representable"],
-        json!(["energy", "seconds_solve", "smallest_gap", "totals.seconds_solve"])
+        json!([
+            "energy",
+            "seconds_solve",
+            "smallest_gap",
+            "totals.seconds_solve"
+        ])
     );
 }
 

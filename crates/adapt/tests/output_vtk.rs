@@ -128,7 +128,11 @@ fn a_level_reads_back_to_the_bit() {
             panic!("not from XML");
         };
         let vertices = mesh.triangles().iter().flatten();
-        assert!(vertices.map(|v| u64::from(v.0)).eq(connectivity.iter().copied()));
+        assert!(
+            vertices
+                .map(|v| u64::from(v.0))
+                .eq(connectivity.iter().copied())
+        );
         assert!((1..=m as u64).map(|t| 3 * t).eq(offsets.iter().copied()));
 
         assert_eq!(names(&piece.data.point), POINT_ARRAYS);
@@ -137,10 +141,7 @@ fn a_level_reads_back_to_the_bit() {
             assert_eq!(read, bits_of(&awkward(n, salt)), "{name}");
         }
         let contact: Vec<u8> = fields.contact.iter().map(|&c| c.into()).collect();
-        assert_eq!(
-            buffer(&piece.data.point, "contact"),
-            &IOBuffer::U8(contact)
-        );
+        assert_eq!(buffer(&piece.data.point, "contact"), &IOBuffer::U8(contact));
 
         assert_eq!(names(&piece.data.cell), CELL_ARRAYS);
         for (salt, name) in (7..).zip(&CELL_ARRAYS[..7]) {
@@ -208,7 +209,10 @@ fn edges_read_back_to_the_bit() {
             panic!("no lines");
         };
         let ends = fields.edges.iter().flatten();
-        assert!(ends.map(|v| u64::from(v.0)).eq(connectivity.iter().copied()));
+        assert!(
+            ends.map(|v| u64::from(v.0))
+                .eq(connectivity.iter().copied())
+        );
         assert_eq!(offsets.len(), fields.edges.len());
         assert_eq!(names(&piece.data.cell), ["eta_e"]);
         assert_eq!(

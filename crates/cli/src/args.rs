@@ -63,7 +63,7 @@ pub struct RunArgs {
     /// The scene file
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Folder of the results [default: runs/<name of the scene>]
+    /// Folder of the results [default: runs/NAME, the scene being NAME.toml]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Override a key of the scene by its dotted name, for example stop.vertices=50000
@@ -191,7 +191,12 @@ mod tests {
 
     #[test]
     fn mistakes_are_exit_code_2() {
-        for text in ["membranes", "membranes rnu a.toml", "membranes run", "membranes run a --nope"] {
+        for text in [
+            "membranes",
+            "membranes rnu a.toml",
+            "membranes run",
+            "membranes run a --nope",
+        ] {
             assert_eq!(parsed(text), Err(2), "{text}");
         }
         assert_eq!(parsed("membranes --version"), Err(0));

@@ -91,7 +91,9 @@ fn text(scene: &Scene, first: Option<&LevelRecord>) -> String {
     let model = model(scene);
     let explained = match model {
         Reduction::ConstantTensions => "one linear and one scalar obstacle problem",
-        Reduction::ConstantRatio => "the tensions are in a constant ratio: one linear and one scalar obstacle problem",
+        Reduction::ConstantRatio => {
+            "the tensions are in a constant ratio: one linear and one scalar obstacle problem"
+        }
         _ => "both membranes at once",
     };
     line("model", format!("{} ({explained})", reduction_name(model)));
@@ -166,10 +168,15 @@ fn estimators(scene: &Scene) -> String {
 fn object(scene: &Scene, first: Option<&LevelRecord>) -> Value {
     let overview = &scene.overview;
     let settings = &scene.settings;
-    let also: Vec<&str> = settings.estimate.also.iter().map(|also| names::estimator(*also)).collect();
+    let also: Vec<&str> = settings
+        .estimate
+        .also
+        .iter()
+        .map(|also| names::estimator(*also))
+        .collect();
     let stop: serde_json::Map<String, Value> = names::rules(&settings.stop)
         .into_iter()
-        .map(|(name, value)| (name.to_owned(), value.into()))
+        .map(|(name, value)| (name.to_owned(), value))
         .collect();
     json!({
         "title": scene.title,

@@ -24,7 +24,9 @@ pub struct Failure {
 impl Failure {
     /// A message in the usual form.
     pub fn new(code: u8, message: impl std::fmt::Display, hint: Option<&str>) -> Self {
-        let hint = hint.map(|hint| format!("\nhint: {hint}")).unwrap_or_default();
+        let hint = hint
+            .map(|hint| format!("\nhint: {hint}"))
+            .unwrap_or_default();
         Failure {
             code,
             message: format!("error: {message}{hint}"),
@@ -35,7 +37,11 @@ impl Failure {
     pub fn not_in_this_version(what: &str) -> Self {
         let hint = "the commands of this version are `membranes run` and `membranes check`";
         let hint = (!what.starts_with('-')).then_some(hint);
-        Failure::new(WRONG_INPUT, format!("`{what}` is not in this version"), hint)
+        Failure::new(
+            WRONG_INPUT,
+            format!("`{what}` is not in this version"),
+            hint,
+        )
     }
 
     /// Says it on standard error.
@@ -47,7 +53,11 @@ impl Failure {
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
         Failure {
-            code: if error.is_reading() { FILES } else { WRONG_INPUT },
+            code: if error.is_reading() {
+                FILES
+            } else {
+                WRONG_INPUT
+            },
             message: error.to_string(),
         }
     }
@@ -60,9 +70,11 @@ impl From<OutputError> for Failure {
                 let hint = "choose another one with `--out`, or replace the files of an earlier run with `--force`";
                 Failure::new(WRONG_INPUT, error, Some(hint))
             }
-            _ if error.is_user_error() => {
-                Failure::new(WRONG_INPUT, error, Some("choose another folder with `--out`"))
-            }
+            _ if error.is_user_error() => Failure::new(
+                WRONG_INPUT,
+                error,
+                Some("choose another folder with `--out`"),
+            ),
             _ => Failure::new(FILES, error, None),
         }
     }

@@ -2,6 +2,7 @@
 
 use adapt::settings::{Children, Estimator, Fields, Stop, Strategy};
 use contact::{Solver, Tolerance};
+use serde_json::Value;
 
 /// `solve.solver`.
 pub fn solver(solver: Solver) -> &'static str {
@@ -56,14 +57,13 @@ pub fn fields(fields: Fields) -> String {
 }
 
 /// The rules under `[stop]` that apply, with their values.
-pub fn rules(stop: &Stop) -> Vec<(&'static str, f64)> {
-    let count = |n: Option<usize>| n.map(|n| n as f64);
+pub fn rules(stop: &Stop) -> Vec<(&'static str, Value)> {
     [
-        ("relative_error", stop.relative_error),
-        ("error", stop.error),
-        ("vertices", count(stop.vertices)),
-        ("levels", count(stop.levels)),
-        ("seconds", stop.seconds),
+        ("relative_error", stop.relative_error.map(Value::from)),
+        ("error", stop.error.map(Value::from)),
+        ("vertices", stop.vertices.map(Value::from)),
+        ("levels", stop.levels.map(Value::from)),
+        ("seconds", stop.seconds.map(Value::from)),
     ]
     .into_iter()
     .filter_map(|(name, value)| Some((name, value?)))

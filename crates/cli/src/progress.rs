@@ -39,7 +39,16 @@ fn header(record: &LevelRecord) -> String {
     };
     format!(
         "{:>5} {:>9} {:>9} {:>8} {:>10} {:>9}{exact} {:>12} {:>4} {:>8} {:>8}",
-        "level", "vertices", "triangles", "contact", "bound", "relative", "solver", "its", "kkt", "seconds"
+        "level",
+        "vertices",
+        "triangles",
+        "contact",
+        "bound",
+        "relative",
+        "solver",
+        "its",
+        "kkt",
+        "seconds"
     )
 }
 

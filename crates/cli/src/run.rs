@@ -36,7 +36,9 @@ pub fn run(arguments: &RunArgs) -> Result<u8, Failure> {
     };
     let done = adapt::run(&scene.problem, &scene.settings, &mut progress);
     let (ending, stopped_by, failure) = match done {
-        Ok(outcome) if outcome.reason.is_goal() => (Ending::Goal, outcome.reason.key().to_owned(), None),
+        Ok(outcome) if outcome.reason.is_goal() => {
+            (Ending::Goal, outcome.reason.key().to_owned(), None)
+        }
         Ok(outcome) => (Ending::Limit, outcome.reason.key().to_owned(), None),
         Err(error) => {
             let stopped_by = error.to_string();

@@ -11,6 +11,9 @@ use crate::solution::{Reduction, Solution, SolveInfo, Status, kkt_residual};
 use crate::start::Start;
 use crate::system::{Fields, System};
 
+/// Rounding error of a row of a linear system, relative to the sum of the magnitudes of its terms.
+const ROW_ROUNDING: f64 = 4.0 * f64::EPSILON;
+
 /// Which method solves the inequality.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Method {
@@ -201,15 +204,19 @@ impl<'a> Level<'a> {
         }
     }
 
-    /// z on the contact set, from the row of the softer membrane; 0 elsewhere, nowhere negative.
+    /// z on the contact set, from the row of the softer membrane; 0 elsewhere, and where it is not positive beyond rounding.
     fn forces(&self, displacement: &[Vec<f64>; 2], contact: &[bool]) -> Vec<f64> {
         let problem = self.problem;
         let mut force = vec![0.0; problem.order()];
         for j in self.interior.iter().filter(|&j| contact[j]) {
             let i = usize::from(problem.diagonal(1, j) < problem.diagonal(0, j));
-            let residual =
-                problem.loads[i].nodal[j] - problem.stiffness[i].row_dot(j, &displacement[i]);
-            force[j] = if i == 0 { -residual } else { residual }.max(0.0);
+            let (matrix, load) = (&problem.stiffness[i], problem.loads[i].nodal[j]);
+            let residual = load - matrix.row_dot(j, &displacement[i]);
+            let z = if i == 0 { -residual } else { residual };
+            let terms = load.abs() + matrix.row_dot_abs(j, &displacement[i]);
+            if z > ROW_ROUNDING * terms {
+                force[j] = z;
+            }
         }
         force
     }

@@ -1,5 +1,8 @@
 //! The discrete problem of two membranes in unilateral contact, and its solvers.
 
+#[cfg(test)]
+extern crate self as contact;
+
 mod active_set;
 mod cholesky;
 pub mod error;
@@ -22,3 +25,9 @@ pub use settings::{Settings, Solver, Tolerance};
 pub use solution::{Reduction, Solution, SolveInfo, Status, kkt_residual, rounding_residual};
 pub use solve::{ACTIVE_SET_LIMIT, INTERIOR_POINT_LIMIT, solve};
 pub use start::Start;
+
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[cfg(test)]
+mod hard_tests;

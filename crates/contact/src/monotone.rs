@@ -79,7 +79,7 @@ pub(crate) fn solve(
 }
 
 /// Moves from feasible fields towards the projection of the candidate, to the least energy that keeps the gaps nonnegative.
-fn descend(system: &System, fields: &mut Fields, mut candidate: Fields) {
+pub(crate) fn descend(system: &System, fields: &mut Fields, mut candidate: Fields) {
     system.project(&mut candidate);
     let direction: Fields = fields
         .iter()

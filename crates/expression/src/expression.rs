@@ -27,7 +27,7 @@ impl Variable {
     }
 }
 
-/// A formula of `x`, `y` and `region`, parsed, folded and compiled. Evaluation needs no more than a shared reference,
+/// A formula of `x`, `y` and `region`, parsed, folded and compiled. Evaluation takes `&self` and may be called
 /// from any number of threads.
 #[derive(Debug, Clone)]
 pub struct Expression {

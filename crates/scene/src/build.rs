@@ -38,12 +38,13 @@ impl Scene {
     pub fn data_error(&self, error: &DataError) -> SceneError {
         match error {
             DataError::Field(field) => self.places.at(&field.name, refusal(field)),
-            DataError::Tension { membrane, .. } => {
-                self.places.at(&format!("{membrane}.tension"), Fault::nowhere(error.to_string()))
-            }
-            DataError::Heights { .. } => {
-                self.places.at("lower.boundary", Fault::nowhere(error.to_string()))
-            }
+            DataError::Tension { membrane, .. } => self.places.at(
+                &format!("{membrane}.tension"),
+                Fault::nowhere(error.to_string()),
+            ),
+            DataError::Heights { .. } => self
+                .places
+                .at("lower.boundary", Fault::nowhere(error.to_string())),
         }
     }
 }
@@ -61,7 +62,11 @@ impl Places {
         formulas.extend(checked.load.iter().chain(&checked.boundary));
         if let Some(exact) = &checked.exact {
             formulas.extend(&exact.displacement);
-            formulas.extend([&exact.action, &exact.sigma, &exact.contact].into_iter().flatten());
+            formulas.extend(
+                [&exact.action, &exact.sigma, &exact.contact]
+                    .into_iter()
+                    .flatten(),
+            );
         }
         let error = |formula: &Formula| {
             let fault = blame(&formula.place, String::new());
@@ -76,8 +81,14 @@ impl Places {
     /// The key that `name` begins with or is made from.
     fn at(&self, name: &str, fault: Fault) -> SceneError {
         let name = name.trim_start_matches("d(");
-        let found = self.keys.iter().find(|(key, _)| name.starts_with(key.as_str()));
-        let mut report = found.map_or(&self.file, |(_, error)| error).report().clone();
+        let found = self
+            .keys
+            .iter()
+            .find(|(key, _)| name.starts_with(key.as_str()));
+        let mut report = found
+            .map_or(&self.file, |(_, error)| error)
+            .report()
+            .clone();
         report.message = fault.message;
         report.hint = fault.hint;
         SceneError::new(report)
@@ -136,8 +147,7 @@ pub(crate) fn scene(
         smallest_angle: survey.smallest_angle(),
         tension: tension.map(|range| [range.least, range.largest]),
         constant_tensions,
-        constant_ratio: constant_tensions
-            || survey.same_ratio(&checked.tension).map_err(report)?,
+        constant_ratio: constant_tensions || survey.same_ratio(&checked.tension).map_err(report)?,
         exact: checked.exact.is_some(),
     };
     let scale = choose_scale(
@@ -154,13 +164,15 @@ pub(crate) fn scene(
         tension: [0, 1].map(|i| -> Arc<dyn Field> {
             Arc::new(field(&checked.tension[i], scale.tension).positive())
         }),
-        load: [0, 1]
-            .map(|i| -> Arc<dyn Field> { Arc::new(field(&checked.load[i], scale.load)) }),
+        load: [0, 1].map(|i| -> Arc<dyn Field> { Arc::new(field(&checked.load[i], scale.load)) }),
         height: [
             Arc::new(upper.clone()),
             Arc::new(LowerHeight { lower, upper }),
         ],
-        exact: checked.exact.as_ref().map(|exact| exact_fields(exact, scale)),
+        exact: checked
+            .exact
+            .as_ref()
+            .map(|exact| exact_fields(exact, scale)),
         mesh: initial.mesh,
         scale,
     };
@@ -200,7 +212,12 @@ fn exact_fields(exact: &Exact, scale: Scale) -> estimate::Exact {
         [Variable::X, Variable::Y].map(|variable| -> Arc<dyn Field> {
             let slope = gradient(formula, variable);
             let unit = unit - scale.length;
-            Arc::new(ExpressionField::new(&slope.name, &slope.expression, scale.length, unit))
+            Arc::new(ExpressionField::new(
+                &slope.name,
+                &slope.expression,
+                scale.length,
+                unit,
+            ))
         })
     };
     let plain = |formula: &Formula, unit: i32| -> Arc<dyn Field> {
@@ -230,7 +247,12 @@ mod tests {
                 load: -2
             }
         );
-        let moved = choose_scale(1 + 5, 3.0 * 4f64.powi(7), 0.4 * 8.0, 0.05 * 2f64.powi(3 + 10 - 14));
+        let moved = choose_scale(
+            1 + 5,
+            3.0 * 4f64.powi(7),
+            0.4 * 8.0,
+            0.05 * 2f64.powi(3 + 10 - 14),
+        );
         let expected = Scale {
             length: 6,
             tension: 14,

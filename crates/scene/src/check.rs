@@ -96,7 +96,10 @@ impl Survey<'_> {
             return Ok([a, b].map(|v| Range::NONE.with(v)));
         }
         for (t, face) in self.mesh.boundary_edges() {
-            let [p, q] = self.mesh.face(t, face).map(|v| self.mesh.points()[v.index()]);
+            let [p, q] = self
+                .mesh
+                .face(t, face)
+                .map(|v| self.mesh.points()[v.index()]);
             let points = on_edge(p, q, self.mesh.curve());
             let region = [f64::from(self.mesh.region()[t.index()]); 5];
             let (x, y) = (points.map(|p| p[0]), points.map(|p| p[1]));
@@ -122,14 +125,17 @@ impl Survey<'_> {
         let height = |formula: &Formula| short(formula.expression.eval_at(error.x, error.y, 0.0));
         let [upper, lower] = [height(&boundary[0]), height(&boundary[1])];
         let at = format!("({}, {})", short(error.x), short(error.y));
-        let region = boundary.iter().any(|formula| formula.expression.uses_region());
+        let region = boundary
+            .iter()
+            .any(|formula| formula.expression.uses_region());
         let message = if region || upper == lower {
             let excess = short(error.value);
             format!("`lower.boundary` exceeds `upper.boundary` by {excess} at {at}")
         } else {
             format!("`lower.boundary` = {lower} exceeds `upper.boundary` = {upper} at {at}")
         };
-        blame(&place, message).hint("the lower membrane must not be fixed above the upper one anywhere")
+        blame(&place, message)
+            .hint("the lower membrane must not be fixed above the upper one anywhere")
     }
 
     /// Whether everything that is evaluated of an exact solution is finite inside the triangles.
@@ -143,7 +149,10 @@ impl Survey<'_> {
             for variable in [Variable::X, Variable::Y] {
                 let slope = gradient(formula, variable);
                 let (name, expression) = (&slope.name, &slope.expression);
-                self.interior(formula, ExpressionField::new(name, expression, self.length, 0))?;
+                self.interior(
+                    formula,
+                    ExpressionField::new(name, expression, self.length, 0),
+                )?;
             }
         }
         Ok(())
@@ -190,7 +199,9 @@ impl Survey<'_> {
         let (mut region, mut out) = (Vec::new(), Vec::new());
         let count = self.mesh.triangle_count();
         for start in (0..count).step_by(CHUNK) {
-            (x.clear(), y.clear(), region.clear());
+            for list in [&mut x, &mut y, &mut region] {
+                list.clear();
+            }
             for t in start..count.min(start + CHUNK) {
                 let [a, b, c] = self.mesh.corners(TriangleId(t as u32));
                 for [l, m, n] in INTERIOR {
@@ -248,7 +259,9 @@ pub(crate) fn refusal(error: &FieldError) -> Fault {
     let value = short(error.value);
     let at = format!("({}, {})", short(error.x), short(error.y));
     if error.value.is_finite() && name.ends_with(".tension") {
-        return Fault::nowhere(format!("`{name}` must be greater than 0, but is {value} at {at}"));
+        return Fault::nowhere(format!(
+            "`{name}` must be greater than 0, but is {value} at {at}"
+        ));
     }
     let fault = Fault::nowhere(format!("`{name}` is {value} at {at}"));
     if error.value.is_finite() {

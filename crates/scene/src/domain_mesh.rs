@@ -153,19 +153,27 @@ impl Shape {
                 lower[0], lower[1], upper[0], upper[1]
             ),
             Shape::Disk { center, radius, .. } => {
-                format!("disk of radius {radius} about ({}, {})", center[0], center[1])
+                format!(
+                    "disk of radius {radius} about ({}, {})",
+                    center[0], center[1]
+                )
             }
             Shape::Polygon {
                 outer,
                 holes,
                 lines,
                 ..
-            } => format!(
-                "polygon with {} vertices, {} holes, {} lines",
-                outer.value.len(),
-                holes.len(),
-                lines.len()
-            ),
+            } => {
+                let mut text = format!("polygon with {} vertices", outer.value.len());
+                for (count, one) in [(holes.len(), "hole"), (lines.len(), "line")] {
+                    match count {
+                        0 => {}
+                        1 => text.push_str(&format!(", 1 {one}")),
+                        n => text.push_str(&format!(", {n} {one}s")),
+                    }
+                }
+                text
+            }
             Shape::Mesh { file } => format!("mesh file {}", file.value),
         }
     }
@@ -181,9 +189,8 @@ fn values(points: &[At<[f64; 2]>]) -> Vec<[f64; 2]> {
 
 /// The larger side of the bounding box.
 fn extent(points: &[[f64; 2]]) -> f64 {
-    bounds(points.iter().copied()).map_or(0.0, |[low, high]| {
-        (high[0] - low[0]).max(high[1] - low[1])
-    })
+    bounds(points.iter().copied())
+        .map_or(0.0, |[low, high]| (high[0] - low[0]).max(high[1] - low[1]))
 }
 
 fn scale_points(mut raw: RawMesh, e: i32) -> RawMesh {
@@ -226,8 +233,12 @@ fn place_of(error: &DomainError, shape: &At<Shape>) -> Place {
         DomainError::TooFewPoints { part: p, .. } | DomainError::ZeroArea { part: p } => {
             part(*p, None)
         }
-        DomainError::VertexNotFinite { part: p, vertex, .. }
-        | DomainError::VertexTiny { part: p, vertex, .. }
+        DomainError::VertexNotFinite {
+            part: p, vertex, ..
+        }
+        | DomainError::VertexTiny {
+            part: p, vertex, ..
+        }
         | DomainError::RepeatedVertex {
             part: p,
             second: vertex,
@@ -249,12 +260,14 @@ fn place_of(error: &DomainError, shape: &At<Shape>) -> Place {
 fn read(file: &At<String>, sources: &Sources<'_>, folder: &Path) -> Result<RawMesh, SceneError> {
     let path = folder.join(&file.value);
     let shown = path.display();
-    let refuse = |message: String, hint: &str| {
-        sources.report(Fault::at(&file.place, message).hint(hint))
-    };
+    let refuse =
+        |message: String, hint: &str| sources.report(Fault::at(&file.place, message).hint(hint));
     if path.is_dir() {
         let hint = "name a Gmsh file: `file = \"plate.msh\"`";
-        return Err(refuse(format!("the mesh file `{shown}` is a directory"), hint));
+        return Err(refuse(
+            format!("the mesh file `{shown}` is a directory"),
+            hint,
+        ));
     }
     let raw = domain::gmsh::read(&path).map_err(|error| match error.fault() {
         GmshFault::Io { error: io } if io.kind() == std::io::ErrorKind::NotFound => {
@@ -272,7 +285,11 @@ fn read(file: &At<String>, sources: &Sources<'_>, folder: &Path) -> Result<RawMe
                 excerpt: error.line().and_then(|line| line_of(&path, line)),
                 message,
                 hint: error.hint(),
-                kind: if error.is_io() { Kind::Reading } else { Kind::Input },
+                kind: if error.is_io() {
+                    Kind::Reading
+                } else {
+                    Kind::Input
+                },
                 ..Report::default()
             })
         }

@@ -89,7 +89,11 @@ impl fmt::Display for SceneError {
                 .unwrap_or_default();
             let margin = " ".repeat(number.len().max(3));
             let (line, pad, carets) = excerpt.shown();
-            write!(f, "\n{margin}|\n{number:<width$}| {line}", width = margin.len())?;
+            write!(
+                f,
+                "\n{margin}|\n{number:<width$}| {line}",
+                width = margin.len()
+            )?;
             write!(f, "\n{margin}| {pad}{carets}")?;
         }
         if let Some(hint) = &report.hint {

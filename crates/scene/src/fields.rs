@@ -154,7 +154,10 @@ mod tests {
     #[test]
     fn points_and_values_are_scaled() {
         let f = field("x + 10*y + 100*region", 2, 3);
-        assert_eq!(sample(&f, &[1.0, 2.0], &[0.5, 0.25]).unwrap(), [40.5, 39.75]);
+        assert_eq!(
+            sample(&f, &[1.0, 2.0], &[0.5, 0.25]).unwrap(),
+            [40.5, 39.75]
+        );
         assert_eq!(field("12", 5, 2).constant(), Some(3.0));
         assert_eq!(f.constant(), None);
     }
@@ -165,7 +168,10 @@ mod tests {
         let expected = times_power_of_two(1e-300, 1900);
         assert!(expected.is_finite() && expected > 0.0);
         assert_eq!(sample(&f, &[0.0], &[0.0]).unwrap(), [expected]);
-        assert_eq!(field("1e300", 0, 1900).constant(), Some(times_power_of_two(1e300, -1900)));
+        assert_eq!(
+            field("1e300", 0, 1900).constant(),
+            Some(times_power_of_two(1e300, -1900))
+        );
         assert!(sample(&field("1e300", 0, -1900), &[0.0], &[0.0]).is_err());
         assert_eq!(field("1e300", 0, -1900).constant(), None);
     }

@@ -15,7 +15,8 @@ pub(crate) fn diameter(points: &[[f64; 2]]) -> f64 {
     let mut largest = 0.0f64;
     for i in 0..n {
         let next = (i + 1) % n;
-        while cross(hull[i], hull[next], hull[(far + 1) % n]) > cross(hull[i], hull[next], hull[far])
+        while cross(hull[i], hull[next], hull[(far + 1) % n])
+            > cross(hull[i], hull[next], hull[far])
         {
             far = (far + 1) % n;
         }
@@ -75,7 +76,9 @@ mod tests {
     fn it_agrees_with_trying_all_pairs() {
         let mut state = 1u64;
         let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         for n in 3..60 {

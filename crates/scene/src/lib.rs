@@ -97,8 +97,12 @@ fn read_text(path: &Path, name: &str) -> Result<String, SceneError> {
         std::io::ErrorKind::NotFound => {
             let hint = Some("a relative path is taken from the current folder");
             failed("the scene does not exist".into(), hint, Kind::Input)
-        },
-        _ => failed(format!("the scene cannot be read: {error}"), None, Kind::Reading),
+        }
+        _ => failed(
+            format!("the scene cannot be read: {error}"),
+            None,
+            Kind::Reading,
+        ),
     })?;
     String::from_utf8(bytes).map_err(|error| {
         let line = 1 + error.as_bytes()[..error.utf8_error().valid_up_to()]

@@ -126,7 +126,10 @@ mod tests {
     #[test]
     fn missing_keys_and_sections_are_made() {
         let text = "[domain.disk]\n";
-        let made = applied(text, &["stop.levels=3", "title=A \"b\"", "domain.disk.size=0.5"]);
+        let made = applied(
+            text,
+            &["stop.levels=3", "title=A \"b\"", "domain.disk.size=0.5"],
+        );
         let back: toml_edit::DocumentMut = made.parse().unwrap();
         assert_eq!(back["stop"]["levels"].as_integer(), Some(3));
         assert_eq!(back["title"].as_str(), Some("A \"b\""));
@@ -138,7 +141,12 @@ mod tests {
         let text = "stop = { levels = 3 }\ndomain.disk.radius = 2\nsolve = {}\n";
         let made = applied(
             text,
-            &["stop.vertices=7", "domain.disk.size=1", "solve.a.b=1", "stop={levels=4}"],
+            &[
+                "stop.vertices=7",
+                "domain.disk.size=1",
+                "solve.a.b=1",
+                "stop={levels=4}",
+            ],
         );
         let back: toml_edit::DocumentMut = made.parse().unwrap();
         assert_eq!(back["stop"]["levels"].as_integer(), Some(4));
@@ -149,7 +157,10 @@ mod tests {
 
     #[test]
     fn a_value_that_is_no_toml_is_a_string() {
-        assert_eq!(applied("", &["solve.solver=active-set"]), "[solve]\nsolver = \"active-set\"\n");
+        assert_eq!(
+            applied("", &["solve.solver=active-set"]),
+            "[solve]\nsolver = \"active-set\"\n"
+        );
         assert_eq!(applied("", &["title="]), "title = \"\"\n");
     }
 

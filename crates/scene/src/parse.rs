@@ -3,16 +3,16 @@
 use adapt::settings::{Estimator, Fields as NamedFields, Strategy};
 use contact::Solver;
 
-use crate::reader::{
-    Section, boolean, choice, list, not_in_this_version, number, point, text,
-};
+use crate::reader::{Section, boolean, choice, list, not_in_this_version, number, point, text};
 use crate::source::{At, Fault, Place};
 use crate::tree::{Entry, Node, Value};
 use crate::types::{
-    Estimate, Exact, Fields, Mark, Membrane, Number, Output, Point, SceneFile, Shape, Solve, Stop,
+    Estimate, Exact, Fields, Mark, Membrane, Number, Output, Parameter, Point, SceneFile, Shape,
+    Solve, Stop,
 };
 
-const TOP: [&str; 10] = [
+/// Keys and sections at the top of a file.
+const TOP: [&str; 11] = [
     "title",
     "parameters",
     "domain",
@@ -23,8 +23,9 @@ const TOP: [&str; 10] = [
     "estimate",
     "mark",
     "stop",
+    "output",
 ];
-const OUTPUT: &str = "output";
+/// Kinds of domain.
 const SHAPES: [&str; 4] = ["rectangle", "disk", "polygon", "mesh"];
 
 /// Names of the estimators; those without a value come later.
@@ -36,8 +37,7 @@ const ESTIMATORS: [(&str, Option<Estimator>); 3] = [
 
 /// Decodes a scene.
 pub(crate) fn scene(entries: &[Entry]) -> Result<SceneFile, Fault> {
-    let known: Vec<&str> = TOP.into_iter().chain([OUTPUT]).collect();
-    let top = Section::new("", entries, &known)?;
+    let top = Section::new("", entries, &TOP)?;
     let title = top.get("title", text)?.map(|title| title.value);
     Ok(SceneFile {
         title,
@@ -53,7 +53,7 @@ pub(crate) fn scene(entries: &[Entry]) -> Result<SceneFile, Fault> {
     })
 }
 
-fn parameters(top: &Section<'_>) -> Result<Vec<(At<String>, At<Number>)>, Fault> {
+fn parameters(top: &Section<'_>) -> Result<Vec<Parameter>, Fault> {
     let entries = top.below("parameters")?.unwrap_or_default();
     entries
         .iter()
@@ -67,13 +67,14 @@ fn parameters(top: &Section<'_>) -> Result<Vec<(At<String>, At<Number>)>, Fault>
                 value: number(&entry.node, &path)?,
                 place: entry.node.place.clone(),
             };
-            Ok((name, value))
+            Ok(Parameter { name, value })
         })
         .collect()
 }
 
 fn domain(top: &Section<'_>) -> Result<At<Shape>, Fault> {
-    const HINT: &str = "add one of [domain.rectangle], [domain.disk], [domain.polygon], [domain.mesh]";
+    const HINT: &str =
+        "add one of [domain.rectangle], [domain.disk], [domain.polygon], [domain.mesh]";
     let (Some(header), Some(entries)) = (top.entry("domain"), top.below("domain")?) else {
         return Err(Fault::nowhere("the scene has no domain").hint(HINT));
     };
@@ -251,10 +252,10 @@ fn stop(top: &Section<'_>) -> Result<Stop, Fault> {
 }
 
 fn output(top: &Section<'_>) -> Result<Output, Fault> {
-    let Some(entries) = top.below(OUTPUT)? else {
+    let Some(entries) = top.below("output")? else {
         return Ok(Output::default());
     };
-    let section = Section::new(OUTPUT, entries, &["fields", "compression", "edges"])?;
+    let section = Section::new("output", entries, &["fields", "compression", "edges"])?;
     if let Some(at) = section.get("compression", boolean)?
         && at.value
     {

@@ -71,9 +71,8 @@ impl<'a> Section<'a> {
         hint: &str,
         read: impl FnOnce(&'a Node, &str) -> Result<T, Fault>,
     ) -> Result<At<T>, Fault> {
-        self.get(key, read)?.ok_or_else(|| {
-            Fault::at(place, format!("`{}` is missing", self.path(key))).hint(hint)
-        })
+        self.get(key, read)?
+            .ok_or_else(|| Fault::at(place, format!("`{}` is missing", self.path(key))).hint(hint))
     }
 }
 
@@ -100,7 +99,10 @@ fn unknown_key(section: &str, entry: &Entry, known: &[&str]) -> Fault {
         _ => format!("valid keys: {}", known.join(", ")),
     };
     let hint = match nearest(&entry.key, known) {
-        Some(near) => format!("did you mean `{}`? {valid}", join_shown(section, near, &entry.key_place)),
+        Some(near) => format!(
+            "did you mean `{}`? {valid}",
+            join_shown(section, near, &entry.key_place)
+        ),
         None => valid,
     };
     Fault::at(&entry.key_place, message).hint(hint)
@@ -163,7 +165,11 @@ pub(crate) fn number(node: &Node, path: &str) -> Result<Number, Fault> {
             format!("`{path}` must be a finite number, not {value}"),
         )),
         Value::Text(text) => Ok(Number::Formula(text.clone())),
-        _ => Err(wrong_type(node, path, "a number or an expression in quotes")),
+        _ => Err(wrong_type(
+            node,
+            path,
+            "a number or an expression in quotes",
+        )),
     }
 }
 
@@ -231,8 +237,9 @@ pub(crate) fn choice<T: Copy>(
     };
     match names.iter().find(|(name, _)| name == text) {
         Some((_, Some(value))) => Ok(*value),
-        Some((_, None)) => Err(not_in_this_version(&node.place, path, &format!("\"{text}\""))
-            .hint(listed)),
+        Some((_, None)) => {
+            Err(not_in_this_version(&node.place, path, &format!("\"{text}\"")).hint(listed))
+        }
         None => {
             let all: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
             let hint = match nearest(text, &all) {
@@ -246,8 +253,5 @@ pub(crate) fn choice<T: Copy>(
 
 /// The refusal of what later versions do.
 pub(crate) fn not_in_this_version(place: &Place, path: &str, value: &str) -> Fault {
-    Fault::at(
-        place,
-        format!("`{path} = {value}` is not in this version"),
-    )
+    Fault::at(place, format!("`{path} = {value}` is not in this version"))
 }

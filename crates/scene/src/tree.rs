@@ -102,12 +102,7 @@ fn table(table: &DeTable<'_>, source: usize, offset: usize) -> Vec<Entry> {
     entries
 }
 
-fn node(
-    value: &DeValue<'_>,
-    span: std::ops::Range<usize>,
-    source: usize,
-    offset: usize,
-) -> Node {
+fn node(value: &DeValue<'_>, span: std::ops::Range<usize>, source: usize, offset: usize) -> Node {
     let value = match value {
         DeValue::String(text) => Value::Text(text.to_string()),
         DeValue::Integer(integer) => Value::Number(

@@ -17,13 +17,22 @@ pub enum Number {
 /// A point as it was written.
 pub type Point = [At<Number>; 2];
 
+/// A name under `[parameters]` with its value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// The name.
+    pub name: At<String>,
+    /// The value.
+    pub value: At<Number>,
+}
+
 /// A scene file, decoded. Every field is a key of the file; `None` where it is not given.
 #[derive(Clone, Debug)]
 pub struct SceneFile {
     /// `title`.
     pub title: Option<String>,
-    /// `[parameters]` in the order of the file: name and value.
-    pub parameters: Vec<(At<String>, At<Number>)>,
+    /// `[parameters]` in the order of the file.
+    pub parameters: Vec<Parameter>,
     /// The domain.
     pub domain: At<Shape>,
     /// `[upper]` and `[lower]`.

@@ -131,14 +131,14 @@ fn parameters(file: &SceneFile, sources: &Sources<'_>) -> Result<Scope, Fault> {
     let names: Vec<&str> = file
         .parameters
         .iter()
-        .map(|(name, _)| name.value.as_str())
+        .map(|parameter| parameter.name.value.as_str())
         .collect();
     let mut reader = Reader {
         scope: Scope::new(),
         sources,
         later: names,
     };
-    for (name, number) in &file.parameters {
+    for types::Parameter { name, value } in &file.parameters {
         // A name that cannot be used is reported before its value is looked at.
         let refused = |error: ScopeError| {
             let text = error.to_string();
@@ -149,7 +149,7 @@ fn parameters(file: &SceneFile, sources: &Sources<'_>) -> Result<Scope, Fault> {
             Fault::at(&name.place, message).maybe_hint(hint)
         };
         Scope::new().define(&name.value, 0.0).map_err(refused)?;
-        let value = reader.number(number)?;
+        let value = reader.number(value)?;
         reader.scope.define(&name.value, value).map_err(refused)?;
         reader.later.remove(0);
     }
@@ -171,7 +171,9 @@ impl Reader<'_> {
             Number::Formula(text) => {
                 Expression::parse_constant(text, &self.scope).map_err(|mut error| {
                     // Names of the place do not help where a single number is wanted.
-                    error.hint = error.hint.map(|hint| hint.replace("`x`, `y`, `region`, ", ""));
+                    error.hint = error
+                        .hint
+                        .map(|hint| hint.replace("`x`, `y`, `region`, ", ""));
                     self.parse_fault(&at.place, text, error)
                 })
             }
@@ -183,8 +185,11 @@ impl Reader<'_> {
         let at = self.sources.inside(place, error.span);
         match self.later.iter().position(|later| *later == name) {
             Some(0) => Fault::at(&at, format!("parameter `{name}` is defined by itself")),
-            Some(_) => Fault::at(&at, format!("parameter `{name}` is used before it is defined"))
-                .hint("a parameter may use those above it; change their order"),
+            Some(_) => Fault::at(
+                &at,
+                format!("parameter `{name}` is used before it is defined"),
+            )
+            .hint("a parameter may use those above it; change their order"),
             None => Fault::at(&at, error.message).maybe_hint(error.hint),
         }
     }
@@ -260,7 +265,7 @@ impl Reader<'_> {
                 Shape::Rectangle {
                     lower: low,
                     upper: high,
-                    size: self.size(size, "domain.rectangle.size")?,
+                    size: self.positive(size, "domain.rectangle.size")?,
                 }
             }
             types::Shape::Disk {
@@ -272,8 +277,10 @@ impl Reader<'_> {
                     Some(at) => self.point(&at.value)?,
                     None => [0.0; 2],
                 },
-                radius: self.positive(radius, "domain.disk.radius")?.map_or(1.0, |at| at.value),
-                size: self.size(size, "domain.disk.size")?,
+                radius: self
+                    .positive(radius, "domain.disk.radius")?
+                    .map_or(1.0, |at| at.value),
+                size: self.positive(size, "domain.disk.size")?,
             },
             types::Shape::Polygon {
                 outer,
@@ -291,7 +298,7 @@ impl Reader<'_> {
                     outer: self.points(outer)?,
                     holes: all(holes)?,
                     lines: all(lines)?,
-                    size: self.size(size, "domain.polygon.size")?,
+                    size: self.positive(size, "domain.polygon.size")?,
                 }
             }
             types::Shape::Mesh { file } => Shape::Mesh { file: file.clone() },
@@ -313,10 +320,6 @@ impl Reader<'_> {
             value: points.collect::<Result<_, Fault>>()?,
             place: list.place.clone(),
         })
-    }
-
-    fn size(&self, at: &Option<At<Number>>, name: &str) -> Result<Option<At<f64>>, Fault> {
-        self.positive(at, name)
     }
 
     fn positive(&self, at: &Option<At<Number>>, name: &str) -> Result<Option<At<f64>>, Fault> {
@@ -345,8 +348,9 @@ impl Reader<'_> {
 
     fn count(&self, at: &Option<At<Number>>, name: &str) -> Result<Option<usize>, Fault> {
         let rule = "a whole number of at least 1";
-        let holds = |v: f64| v >= 1.0 && v <= LARGEST_COUNT && v.fract() == 0.0;
-        Ok(self.within(at, name, rule, holds)?.map(|at| at.value as usize))
+        Ok(self
+            .within(at, name, rule, is_count)?
+            .map(|at| at.value as usize))
     }
 
     fn settings(&self, file: &SceneFile) -> Result<Settings, Fault> {
@@ -367,7 +371,8 @@ impl Reader<'_> {
         if let Some(at) = file.output.edges.as_ref().filter(|at| at.value)
             && !settings.estimate.wants(Estimator::Paper)
         {
-            let message = "`output.edges = true` needs the estimator \"paper\", which computes `eta_e`";
+            let message =
+                "`output.edges = true` needs the estimator \"paper\", which computes `eta_e`";
             return Err(Fault::at(&at.place, message).hint("add \"paper\" to `estimate.also`"));
         }
         if let Some(fields) = &file.output.fields {
@@ -386,7 +391,9 @@ impl Reader<'_> {
         }
         let rule = "\"balanced\" or a number between 0 and 1";
         let tolerance = self
-            .within(&solve.tolerance, "solve.tolerance", rule, |v| v > 0.0 && v < 1.0)
+            .within(&solve.tolerance, "solve.tolerance", rule, |v| {
+                v > 0.0 && v < 1.0
+            })
             .map_err(|fault| or_names(fault, &solve.tolerance, "solve.tolerance", rule))?;
         if let Some(at) = tolerance {
             settings.solve.tolerance = Tolerance::Relative(at.value);
@@ -405,15 +412,18 @@ impl Reader<'_> {
         }
         let either = |v: f64| v == 2.0 || v == 4.0;
         if let Some(at) = self.within(&mark.children, "mark.children", "2 or 4", either)? {
-            settings.mark.children = if at.value == 2.0 { Children::Two } else { Children::Four };
+            settings.mark.children = if at.value == 2.0 {
+                Children::Two
+            } else {
+                Children::Four
+            };
         }
         Ok(())
     }
 
     fn stop(&self, stop: &types::Stop) -> Result<Rules, Fault> {
-        let value = |at: &Option<At<Number>>, name: &str| {
-            Ok(self.positive(at, name)?.map(|at| at.value))
-        };
+        let value =
+            |at: &Option<At<Number>>, name: &str| Ok(self.positive(at, name)?.map(|at| at.value));
         let rules = Rules {
             relative_error: value(&stop.relative_error, "stop.relative_error")?,
             error: value(&stop.error, "stop.error")?,
@@ -441,14 +451,18 @@ impl Reader<'_> {
                 });
                 let name = "output.fields";
                 let rule = "\"all\", \"last\", \"none\" or a whole number of at least 1";
-                let holds = |v: f64| v >= 1.0 && v <= LARGEST_COUNT && v.fract() == 0.0;
                 let every = self
-                    .within(&number, name, rule, holds)
+                    .within(&number, name, rule, is_count)
                     .map_err(|fault| or_names(fault, &number, name, rule))?;
                 Ok(Wanted::Every(every.map_or(1, |at| at.value as usize)))
             }
         }
     }
+}
+
+/// Whether a number counts something.
+fn is_count(value: f64) -> bool {
+    (1.0..=LARGEST_COUNT).contains(&value) && value.fract() == 0.0
 }
 
 /// Where names and numbers are allowed, text that is no number is taken for a wrong name.

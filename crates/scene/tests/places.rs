@@ -18,8 +18,17 @@ fn report(text: &str, overrides: &[&str]) -> Report {
 fn place(text: &str) -> (usize, usize, String) {
     let report = report(text, &[]);
     let excerpt = report.excerpt.expect("an excerpt");
-    let shown = excerpt.line.chars().skip(excerpt.start).take(excerpt.length).collect();
-    (report.line.expect("a line"), report.column.expect("a column"), shown)
+    let shown = excerpt
+        .line
+        .chars()
+        .skip(excerpt.start)
+        .take(excerpt.length)
+        .collect();
+    (
+        report.line.expect("a line"),
+        report.column.expect("a column"),
+        shown,
+    )
 }
 
 #[test]
@@ -34,7 +43,10 @@ fn columns_count_characters_not_bytes() {
 
 #[test]
 fn windows_line_ends_and_a_byte_order_mark() {
-    assert_eq!(place("[domain.disk]\r\n[mark]\r\ntheta = 3\r\n"), (3, 9, "3".into()));
+    assert_eq!(
+        place("[domain.disk]\r\n[mark]\r\ntheta = 3\r\n"),
+        (3, 9, "3".into())
+    );
     let marked = "\u{feff}[domain.disk]\n[mark]\ntheta = 3\n";
     assert_eq!(report(marked, &[]).line, Some(3));
 }
@@ -59,7 +71,10 @@ fn an_override_is_shown_as_it_was_typed() {
     let report = report("[domain.disk]\n", &["stop.levels=3", " mark.theta = 1.5 "]);
     assert_eq!((report.file.as_str(), report.line), ("--set", None));
     let excerpt = report.excerpt.expect("an excerpt");
-    assert_eq!((excerpt.line.as_str(), excerpt.start, excerpt.length), (" mark.theta = 1.5 ", 14, 3));
+    assert_eq!(
+        (excerpt.line.as_str(), excerpt.start, excerpt.length),
+        (" mark.theta = 1.5 ", 14, 3)
+    );
 }
 
 /// Two triangles with the tags 7 and 8.
@@ -84,7 +99,9 @@ fn a_mesh_file_is_found_beside_the_scene_and_its_regions_are_seen() {
         y: &[0.5; 2],
         region: &[7.0, 8.0],
     };
-    scene.problem.tension[0].sample(at, &mut out).expect("positive");
+    scene.problem.tension[0]
+        .sample(at, &mut out)
+        .expect("positive");
     assert_eq!(out, [0.5, 2.0]);
     scene.problem.load[0].sample(at, &mut out).expect("finite");
     assert_eq!(out, [7.0 / 8.0, 1.0]);
@@ -98,7 +115,9 @@ fn a_mesh_file_is_found_beside_the_scene_and_its_regions_are_seen() {
 fn files_that_are_no_scene() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let refused = |name: &str| {
-        let error = load(&folder.path().join(name), &[]).err().expect("an error");
+        let error = load(&folder.path().join(name), &[])
+            .err()
+            .expect("an error");
         assert!(!error.is_reading());
         error.report().message.clone()
     };
@@ -139,10 +158,14 @@ fn random_damage_to_a_scene_never_panics() {
     let bytes = text.as_bytes();
     let mut state = 7u64;
     let mut random = |n: usize| {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
         (state >> 33) as usize % n
     };
-    let pieces = ["", "\"", "[", "]", "=", "nan", "\n", "1e999", "-", "0", "é", "x", "\\", "{", ","];
+    let pieces = [
+        "", "\"", "[", "]", "=", "nan", "\n", "1e999", "-", "0", "é", "x", "\\", "{", ",",
+    ];
     let mut refused = 0;
     for _ in 0..3000 {
         let mut damaged = bytes.to_vec();
@@ -155,7 +178,10 @@ fn random_damage_to_a_scene_never_panics() {
         if let Err(error) = from_text(&damaged, "scene.toml", Path::new(""), &[]) {
             refused += 1;
             let shown = error.to_string();
-            assert!(shown.starts_with("error: ") && shown.contains("\n  --> "), "{shown}");
+            assert!(
+                shown.starts_with("error: ") && shown.contains("\n  --> "),
+                "{shown}"
+            );
         }
     }
     assert!(refused > 1000, "{refused}");

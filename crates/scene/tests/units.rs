@@ -102,10 +102,24 @@ fn same(base: &Problem, other: &Problem, units: Units) {
             all.extend(list.iter().map(|f| &**f));
         }
         let sigma = exact.sigma.as_ref().expect("sigma");
-        all.extend(exact.displacement.iter().chain([sigma]).flatten().map(|f| &**f));
-        all.extend([&exact.action, &exact.contact].into_iter().flatten().map(|f| &**f));
+        all.extend(
+            exact
+                .displacement
+                .iter()
+                .chain([sigma])
+                .flatten()
+                .map(|f| &**f),
+        );
+        all.extend(
+            [&exact.action, &exact.contact]
+                .into_iter()
+                .flatten()
+                .map(|f| &**f),
+        );
         assert_eq!(all.len(), 14);
-        all.into_iter().map(|field| values(problem, field)).collect()
+        all.into_iter()
+            .map(|field| values(problem, field))
+            .collect()
     };
     for (k, (one, two)) in fields(base).iter().zip(&fields(other)).enumerate() {
         assert_eq!(one, two, "field {k} in {units:?}");
@@ -114,7 +128,15 @@ fn same(base: &Problem, other: &Problem, units: Units) {
 
 fn covariant(shape: &str) {
     let base = Units { a: 0, k: 0, l: 0 }.scene(shape);
-    for (a, k, l) in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (-7, 3, -11), (60, -90, 130), (-200, 100, 300), (250, -150, -200)] {
+    for (a, k, l) in [
+        (1, 0, 0),
+        (0, 1, 0),
+        (0, 0, 1),
+        (-7, 3, -11),
+        (60, -90, 130),
+        (-200, 100, 300),
+        (250, -150, -200),
+    ] {
         let units = Units { a, k, l };
         same(&base, &units.scene(shape), units);
     }
@@ -122,7 +144,9 @@ fn covariant(shape: &str) {
 
 #[test]
 fn rectangle() {
-    covariant("[domain.rectangle]\nlower = [L(-0.7), L(0.1)]\nupper = [L(1.3), L(1.2)]\nsize = L(0.3)\n");
+    covariant(
+        "[domain.rectangle]\nlower = [L(-0.7), L(0.1)]\nupper = [L(1.3), L(1.2)]\nsize = L(0.3)\n",
+    );
 }
 
 #[test]
@@ -145,7 +169,8 @@ fn everything_inside_is_of_order_one() {
         let problem = Units { a, k, l }.scene(shape);
         let largest = |fields: &[&dyn Field]| {
             let all = fields.iter().flat_map(|field| values(&problem, *field));
-            all.map(|bits| f64::from_bits(bits).abs()).fold(0.0, f64::max)
+            all.map(|bits| f64::from_bits(bits).abs())
+                .fold(0.0, f64::max)
         };
         let mu = largest(&[&*problem.tension[0], &*problem.tension[1]]);
         assert!((1.0..4.0).contains(&mu), "{mu}");
