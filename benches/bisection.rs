@@ -31,7 +31,10 @@ fn towards_circle(mesh: &Mesh) -> Vec<TriangleId> {
 
 fn family(name: &str, marks: fn(&Mesh) -> Vec<TriangleId>) {
     println!("{name}");
-    println!("{:>10} {:>16} {:>18} {:>12}", "triangles", "ns/new triangle", "closure steps/new", "over copy");
+    println!(
+        "{:>10} {:>16} {:>18} {:>12}",
+        "triangles", "ns/new triangle", "closure steps/new", "over copy"
+    );
     let mut mesh = square();
     while mesh.triangle_count() < GOAL {
         let before = mesh.triangle_count();

@@ -63,7 +63,7 @@ impl Grid {
             [phi.cos(), phi.sin()]
         }));
         let triangles = (0..k)
-            .map(|i| [0, 1 + i as u32, 1 + ((i + 1) % k) as u32])
+            .map(|i| [1 + i as u32, 1 + ((i + 1) % k) as u32, 0])
             .collect();
         Grid {
             points,
@@ -118,7 +118,12 @@ impl Grid {
             center: [0.0, 0.0],
             radius: times_power_of_two(1.0, exponent),
         };
-        Mesh::new(points, &self.triangles, &[], self.circle.then_some(circle)).expect("a grid")
+        // The fan's refinement edges are those on the circle, as in the reference meshes.
+        if self.circle {
+            return Mesh::with_refinement_edges(points, &self.triangles, &[], Some(circle))
+                .expect("a fan");
+        }
+        Mesh::new(points, &self.triangles, &[], None).expect("a grid")
     }
 }
 

@@ -15,7 +15,9 @@ pub enum DataError {
     #[error(transparent)]
     Field(#[from] FieldError),
     /// A tension that is not positive.
-    #[error("the tension of the {membrane} membrane has mean {mean:e} over the triangle around ({x}, {y})")]
+    #[error(
+        "the tension of the {membrane} membrane has mean {mean:e} over the triangle around ({x}, {y})"
+    )]
     Tension {
         /// `upper` or `lower`.
         membrane: &'static str,
@@ -44,12 +46,20 @@ pub enum DataError {
 /// [`DataError`] where data are not finite, a tension is not positive, or g1 < g2.
 pub fn discretise(problem: &Problem, mesh: &Mesh) -> Result<DiscreteProblem, DataError> {
     let physical = |v: f64| fem_core::scale::times_power_of_two(v, problem.scale.length);
-    let tension = [means(mesh, &*problem.tension[0])?, means(mesh, &*problem.tension[1])?];
+    let tension = [
+        means(mesh, &*problem.tension[0])?,
+        means(mesh, &*problem.tension[1])?,
+    ];
     for (mean, membrane) in tension.iter().zip(["upper", "lower"]) {
         if let Some(t) = mean.iter().position(|m| m.is_nan() || *m <= 0.0) {
             let c = mesh.corners(fem_core::TriangleId(t as u32));
             let centre = [0, 1].map(|k| physical((c[0][k] + c[1][k] + c[2][k]) / 3.0));
-            return Err(DataError::Tension { membrane, mean: mean[t], x: centre[0], y: centre[1] });
+            return Err(DataError::Tension {
+                membrane,
+                mean: mean[t],
+                x: centre[0],
+                y: centre[1],
+            });
         }
     }
     let heights = heights(mesh, &problem.height)?;
@@ -59,7 +69,10 @@ pub fn discretise(problem: &Problem, mesh: &Mesh) -> Result<DiscreteProblem, Dat
         let excess = fem_core::scale::times_power_of_two(excess, problem.scale.displacement());
         return Err(DataError::Heights { x, y, excess });
     }
-    let loads = [loads(mesh, &*problem.load[0])?, loads(mesh, &*problem.load[1])?];
+    let loads = [
+        loads(mesh, &*problem.load[0])?,
+        loads(mesh, &*problem.load[1])?,
+    ];
     Ok(DiscreteProblem::new(mesh, tension, loads, heights))
 }
 
@@ -71,15 +84,30 @@ fn heights(mesh: &Mesh, height: &[Arc<dyn Field>; 2]) -> Result<[Vec<f64>; 2], F
             region[v.index()] = f64::from(mesh.region()[t.index()]);
         }
     }
-    let boundary: Vec<usize> = (0..mesh.vertex_count()).filter(|&j| mesh.boundary()[j]).collect();
+    let boundary: Vec<usize> = (0..mesh.vertex_count())
+        .filter(|&j| mesh.boundary()[j])
+        .collect();
     let x: Vec<f64> = boundary.iter().map(|&j| mesh.points()[j][0]).collect();
     let y: Vec<f64> = boundary.iter().map(|&j| mesh.points()[j][1]).collect();
     let region: Vec<f64> = boundary.iter().map(|&j| region[j]).collect();
     let mut values = vec![0.0; boundary.len()];
-    let mut result = [vec![0.0; mesh.vertex_count()], vec![0.0; mesh.vertex_count()]];
+    let mut result = [
+        vec![0.0; mesh.vertex_count()],
+        vec![0.0; mesh.vertex_count()],
+    ];
     for (field, result) in height.iter().zip(&mut result) {
-        field.sample(Samples { x: &x, y: &y, region: &region }, &mut values)?;
-        boundary.iter().zip(&values).for_each(|(&j, &v)| result[j] = v);
+        field.sample(
+            Samples {
+                x: &x,
+                y: &y,
+                region: &region,
+            },
+            &mut values,
+        )?;
+        boundary
+            .iter()
+            .zip(&values)
+            .for_each(|(&j, &v)| result[j] = v);
     }
     Ok(result)
 }

@@ -54,8 +54,22 @@ pub struct Estimates {
 
 impl Level {
     /// Solves and estimates on the initial mesh.
-    pub(crate) fn initial(problem: &Problem, settings: &Settings, begun: Instant) -> Result<Level, LevelError> {
-        Level::on(problem.mesh.clone(), problem, settings, None, Steps { number: 0, refine: 0.0, begun })
+    pub(crate) fn initial(
+        problem: &Problem,
+        settings: &Settings,
+        begun: Instant,
+    ) -> Result<Level, LevelError> {
+        Level::on(
+            problem.mesh.clone(),
+            problem,
+            settings,
+            None,
+            Steps {
+                number: 0,
+                refine: 0.0,
+                begun,
+            },
+        )
     }
 
     /// Refines the marked triangles, carries the solution over, solves and estimates.
@@ -74,7 +88,11 @@ impl Level {
         };
         let refinement = mesh.refine(marked, children)?;
         let carried = Start::prolong(&self.solution, &mesh, refinement.old_vertices);
-        let steps = Steps { number: self.number + 1, refine: start.elapsed().as_secs_f64(), begun };
+        let steps = Steps {
+            number: self.number + 1,
+            refine: start.elapsed().as_secs_f64(),
+            begun,
+        };
         Level::on(mesh, problem, settings, Some(carried), steps)
     }
 
@@ -93,7 +111,14 @@ impl Level {
         let solve = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let estimates = Estimates::of(&mesh, &discrete, &solution, problem, settings)?;
-        let mut record = record(&mesh, &discrete, &solution, &estimates, settings, problem.scale);
+        let mut record = record(
+            &mesh,
+            &discrete,
+            &solution,
+            &estimates,
+            settings,
+            problem.scale,
+        );
         record.level = steps.number;
         record.seconds_refine = steps.refine;
         record.seconds_assemble = assemble;
@@ -101,7 +126,14 @@ impl Level {
         record.seconds_estimate = clock.elapsed().as_secs_f64();
         record.seconds_total = steps.begun.elapsed().as_secs_f64();
         record.peak_memory_mb = peak_memory_mb();
-        Ok(Level { number: steps.number, mesh, discrete, solution, estimates, record })
+        Ok(Level {
+            number: steps.number,
+            mesh,
+            discrete,
+            solution,
+            estimates,
+            record,
+        })
     }
 }
 
@@ -122,36 +154,60 @@ impl Estimates {
     ) -> Result<Estimates, LevelError> {
         let wants = |e| settings.estimate.wants(e);
         let paper = wants(Estimator::Paper).then(|| estimate::paper(mesh, discrete, solution));
-        let residual = wants(Estimator::Residual).then(|| estimate::residual(mesh, discrete, solution));
+        let residual =
+            wants(Estimator::Residual).then(|| estimate::residual(mesh, discrete, solution));
         let oscillation = estimate::oscillation(mesh, discrete);
         let errors = match &problem.exact {
-            Some(exact) => Some(estimate::true_errors(mesh, discrete, solution, exact, &problem.tension)?),
+            Some(exact) => Some(estimate::true_errors(
+                mesh,
+                discrete,
+                solution,
+                exact,
+                &problem.tension,
+            )?),
             None => None,
         };
         // The driving estimator was asked for, so it is there.
-        let (marking, bound): (Vec<f64>, f64) = match (settings.estimate.estimator, &paper, &residual) {
-            (Estimator::Paper, Some(paper), _) => {
-                let squares: Vec<f64> =
-                    paper.eta_k.iter().zip(&oscillation).map(|(e, o)| e * e + o * o).collect();
-                let bound = squares.iter().sum::<f64>().sqrt();
-                (squares, bound)
-            }
-            (_, _, residual) => {
-                let eta = residual.as_deref().unwrap_or_default();
-                let bound = root_sum(eta);
-                let squares = mesh.triangle_ids().zip(eta).map(|(t, e)| {
-                    let h = mesh.shape(t).diameter();
-                    e * e + [0, 1].map(|i| load_square(discrete, i, t.index(), h, 0.0, true)).iter().sum::<f64>()
-                });
-                (squares.collect(), bound)
-            }
-        };
+        let (marking, bound): (Vec<f64>, f64) =
+            match (settings.estimate.estimator, &paper, &residual) {
+                (Estimator::Paper, Some(paper), _) => {
+                    let squares: Vec<f64> = paper
+                        .eta_k
+                        .iter()
+                        .zip(&oscillation)
+                        .map(|(e, o)| e * e + o * o)
+                        .collect();
+                    let bound = squares.iter().sum::<f64>().sqrt();
+                    (squares, bound)
+                }
+                (_, _, residual) => {
+                    let eta = residual.as_deref().unwrap_or_default();
+                    let bound = root_sum(eta);
+                    let squares = mesh.triangle_ids().zip(eta).map(|(t, e)| {
+                        let h = mesh.shape(t).diameter();
+                        e * e
+                            + [0, 1]
+                                .map(|i| load_square(discrete, i, t.index(), h, 0.0, true))
+                                .iter()
+                                .sum::<f64>()
+                    });
+                    (squares.collect(), bound)
+                }
+            };
         let mut largest = 0.0f64;
         for t in mesh.triangle_ids() {
             let shape = mesh.shape(t);
             let weighted = settings.estimate.estimator == Estimator::Residual;
-            let squares =
-                [0, 1].map(|i| load_square(discrete, i, t.index(), shape.diameter(), shape.area, weighted));
+            let squares = [0, 1].map(|i| {
+                load_square(
+                    discrete,
+                    i,
+                    t.index(),
+                    shape.diameter(),
+                    shape.area,
+                    weighted,
+                )
+            });
             largest = largest.max(squares[0] + squares[1]);
         }
         Ok(Estimates {
@@ -177,8 +233,13 @@ fn load_square(
     over_tension: bool,
 ) -> f64 {
     let loads = &discrete.loads[membrane];
-    let square = loads.deviation_squared[triangle] + area * loads.mean[triangle] * loads.mean[triangle];
-    let weight = if over_tension { discrete.tension_mean[membrane][triangle] } else { 1.0 };
+    let square =
+        loads.deviation_squared[triangle] + area * loads.mean[triangle] * loads.mean[triangle];
+    let weight = if over_tension {
+        discrete.tension_mean[membrane][triangle]
+    } else {
+        1.0
+    };
     diameter * diameter * square / weight
 }
 
@@ -193,10 +254,18 @@ fn record(
 ) -> LevelRecord {
     let by = times_power_of_two;
     let (bound_exponent, bound_kind) = bound_unit(settings.estimate.estimator, scale);
-    let Energy { energy, energy_norm: norm } = estimates.energy;
+    let Energy {
+        energy,
+        energy_norm: norm,
+    } = estimates.energy;
     // A quotient of different units; the exponents are joined first, so that neither number can leave the range.
     let over = |number: f64| {
-        (number != 0.0).then(|| by(estimates.bound / number, bound_exponent - scale.energy_norm()))
+        (number != 0.0).then(|| {
+            by(
+                estimates.bound / number,
+                bound_exponent - scale.energy_norm(),
+            )
+        })
     };
     let in_contact = || (0..mesh.vertex_count()).filter(|&j| solution.contact[j]);
     let pressures = (0..mesh.vertex_count()).map(|j| solution.force[j] / discrete.dual_area[j]);
@@ -207,12 +276,24 @@ fn record(
         triangles: mesh.triangle_count(),
         unknowns: solution.info.unknowns,
         contact_vertices: in_contact().count(),
-        contact_area: by(in_contact().map(|j| discrete.dual_area[j]).sum(), scale.area()),
+        contact_area: by(
+            in_contact().map(|j| discrete.dual_area[j]).sum(),
+            scale.area(),
+        ),
         energy: by(energy, scale.energy()),
         energy_norm: by(norm, scale.energy_norm()),
-        eta_k: estimates.paper.as_ref().map(|p| by(p.eta_k_total(), scale.force())),
-        eta_e_sum: estimates.paper.as_ref().map(|p| by(p.eta_e_sum(), scale.force())),
-        residual: estimates.residual.as_ref().map(|r| by(root_sum(r), scale.energy_norm())),
+        eta_k: estimates
+            .paper
+            .as_ref()
+            .map(|p| by(p.eta_k_total(), scale.force())),
+        eta_e_sum: estimates
+            .paper
+            .as_ref()
+            .map(|p| by(p.eta_e_sum(), scale.force())),
+        residual: estimates
+            .residual
+            .as_ref()
+            .map(|r| by(root_sum(r), scale.energy_norm())),
         oscillation: by(root_sum(&estimates.oscillation), scale.force()),
         error_bound: by(estimates.bound, bound_exponent),
         bound_kind,
@@ -227,7 +308,12 @@ fn record(
         kkt_residual: solution.info.kkt_residual,
         contact_force: by(solution.force.iter().sum(), scale.force()),
         max_action: by(pressures.fold(0.0, f64::max), scale.load),
-        smallest_gap: by((0..mesh.vertex_count()).map(|j| solution.gap(j)).fold(f64::INFINITY, f64::min), scale.displacement()),
+        smallest_gap: by(
+            (0..mesh.vertex_count())
+                .map(|j| solution.gap(j))
+                .fold(f64::INFINITY, f64::min),
+            scale.displacement(),
+        ),
         seconds_refine: 0.0,
         seconds_assemble: 0.0,
         seconds_solve: 0.0,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use estimate::Exact;
 use fem_core::{Field, Mesh, Scale};
 
-/// A checked problem: whoever builds one has made sure that tensions are positive and that heights[0] >= heights[1].
+/// A checked problem: whoever builds one has made sure that tensions are positive and that `heights[0] >= heights[1]`.
 #[derive(Clone)]
 pub struct Problem {
     /// The initial mesh.

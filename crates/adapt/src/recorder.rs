@@ -8,7 +8,9 @@ use fem_core::{InteriorEdge, Scale};
 use serde_json::{Map, Value};
 
 use crate::level::Level;
-use crate::output::{EdgeFields, Ending, LevelFields, OutputError, RunFolder, Summary, peak_memory_mb};
+use crate::output::{
+    EdgeFields, Ending, LevelFields, OutputError, RunFolder, Summary, peak_memory_mb,
+};
 use crate::record::LevelRecord;
 use crate::run::{Observer, Reason};
 use crate::settings::{Fields, Output};
@@ -89,7 +91,11 @@ impl Recorder {
         self.written = Some(level.number);
         self.folder.write_level(fields(level, self.scale))?;
         if let (true, Some(paper)) = (self.output.edges, &level.estimates.paper) {
-            let edges: Vec<_> = level.mesh.interior_edges().map(|e: InteriorEdge| e.vertices).collect();
+            let edges: Vec<_> = level
+                .mesh
+                .interior_edges()
+                .map(|e: InteriorEdge| e.vertices)
+                .collect();
             self.folder.write_edges(EdgeFields {
                 level: level.number,
                 error_bound: level.record.error_bound,
@@ -101,7 +107,10 @@ impl Recorder {
         Ok(())
     }
 
-    fn timed(&mut self, write: impl FnOnce(&mut Self) -> Result<(), OutputError>) -> Result<(), OutputError> {
+    fn timed(
+        &mut self,
+        write: impl FnOnce(&mut Self) -> Result<(), OutputError>,
+    ) -> Result<(), OutputError> {
         let clock = Instant::now();
         let result = write(self);
         self.seconds += clock.elapsed().as_secs_f64();
@@ -153,23 +162,38 @@ fn by(values: &[f64], exponent: i32) -> Cow<'_, [f64]> {
     if exponent == 0 {
         return Cow::Borrowed(values);
     }
-    Cow::Owned(values.iter().map(|&v| times_power_of_two(v, exponent)).collect())
+    Cow::Owned(
+        values
+            .iter()
+            .map(|&v| times_power_of_two(v, exponent))
+            .collect(),
+    )
 }
 
 fn scaled_points(level: &Level, scale: Scale) -> Cow<'_, [[f64; 2]]> {
     if scale.length == 0 {
         return Cow::Borrowed(level.mesh.points());
     }
-    Cow::Owned(level.mesh.points().iter().map(|p| p.map(|x| times_power_of_two(x, scale.length))).collect())
+    Cow::Owned(
+        level
+            .mesh
+            .points()
+            .iter()
+            .map(|p| p.map(|x| times_power_of_two(x, scale.length)))
+            .collect(),
+    )
 }
 
 /// The fields of a level in the user's units.
 pub fn fields(level: &Level, scale: Scale) -> LevelFields<'_> {
     let (solution, discrete, estimates) = (&level.solution, &level.discrete, &level.estimates);
     let count = level.mesh.vertex_count();
-    let gap: Vec<f64> = (0..count).map(|j| times_power_of_two(solution.gap(j), scale.displacement())).collect();
-    let action: Vec<f64> =
-        (0..count).map(|j| times_power_of_two(solution.force[j] / discrete.dual_area[j], scale.load)).collect();
+    let gap: Vec<f64> = (0..count)
+        .map(|j| times_power_of_two(solution.gap(j), scale.displacement()))
+        .collect();
+    let action: Vec<f64> = (0..count)
+        .map(|j| times_power_of_two(solution.force[j] / discrete.dual_area[j], scale.load))
+        .collect();
     let paper = estimates.paper.as_ref();
     LevelFields {
         level: level.number,
@@ -185,7 +209,10 @@ pub fn fields(level: &Level, scale: Scale) -> LevelFields<'_> {
         contact: Cow::Borrowed(&solution.contact),
         eta_k: paper.map(|p| by(&p.eta_k, scale.force())),
         eta_e: paper.map(|p| by(&p.eta_e_cell, scale.force())),
-        residual: estimates.residual.as_ref().map(|r| by(r, scale.energy_norm())),
+        residual: estimates
+            .residual
+            .as_ref()
+            .map(|r| by(r, scale.energy_norm())),
         certified: None,
         oscillation: Some(by(&estimates.oscillation, scale.force())),
         f1_h: by(&discrete.loads[0].mean, scale.load),

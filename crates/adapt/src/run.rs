@@ -21,13 +21,20 @@ use crate::settings::{Settings, Stop};
 ///
 /// # Errors
 /// [`RunError`]: what failed, and on which level.
-pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) -> Result<Outcome, RunError> {
+pub fn run(
+    problem: &Problem,
+    settings: &Settings,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, RunError> {
     let begun = Instant::now();
     let failed = |level: usize| move |cause: LevelError| RunError { level, cause };
     let mut level = Level::initial(problem, settings, begun).map_err(failed(0))?; // SOLVE, ESTIMATE
     loop {
         let reason = reached(&settings.stop, settings, &level, problem.scale);
-        observer.level(&level, reason).map_err(|e| RunError { level: level.number, cause: e.into() })?;
+        observer.level(&level, reason).map_err(|e| RunError {
+            level: level.number,
+            cause: e.into(),
+        })?;
         if let Some(reason) = reason {
             return Ok(Outcome { reason, level });
         }
@@ -36,8 +43,14 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             // REFINE, SOLVE, ESTIMATE
             Ok(next) => next,
             Err(cause) => {
-                observer.failed(&level).map_err(|e| RunError { level: level.number, cause: e.into() })?;
-                return Err(RunError { level: level.number + 1, cause });
+                observer.failed(&level).map_err(|e| RunError {
+                    level: level.number,
+                    cause: e.into(),
+                })?;
+                return Err(RunError {
+                    level: level.number + 1,
+                    cause,
+                });
             }
         };
     }
@@ -146,14 +159,29 @@ fn reached(stop: &Stop, settings: &Settings, level: &Level, scale: Scale) -> Opt
     let floor = ROUNDING_SHARE * estimates.largest_contribution;
     // Compared in the unit of the bound, so that neither side leaves the range of double precision.
     let norm = times_power_of_two(estimates.energy.energy_norm, scale.energy_norm() - unit);
-    let relative = stop.relative_error.is_some_and(|goal| estimates.bound <= goal * norm + floor);
+    let relative = stop
+        .relative_error
+        .is_some_and(|goal| estimates.bound <= goal * norm + floor);
     let absolute = stop.error.is_some_and(|goal| record.error_bound <= goal);
     let rules = [
         (relative, Reason::RelativeError),
         (absolute, Reason::Error),
-        (stop.vertices.is_some_and(|limit| record.vertices >= limit), Reason::Vertices),
-        (stop.levels.is_some_and(|limit| record.level + 1 >= limit), Reason::Levels),
-        (stop.seconds.is_some_and(|limit| record.seconds_total >= limit), Reason::Seconds),
+        (
+            stop.vertices.is_some_and(|limit| record.vertices >= limit),
+            Reason::Vertices,
+        ),
+        (
+            stop.levels.is_some_and(|limit| record.level + 1 >= limit),
+            Reason::Levels,
+        ),
+        (
+            stop.seconds
+                .is_some_and(|limit| record.seconds_total >= limit),
+            Reason::Seconds,
+        ),
     ];
-    rules.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
+    rules
+        .into_iter()
+        .find(|(holds, _)| *holds)
+        .map(|(_, reason)| reason)
 }

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 
+use crate::failure::WRONG_INPUT;
+
 /// What is to be done.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Task {
@@ -106,15 +108,17 @@ struct Rest {
 
 /// Understands the arguments; on help, version and mistakes everything is said and only the exit code is left.
 pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Task, u8> {
-    let command = match Cli::try_parse_from(arguments) {
-        Ok(cli) => cli.command,
-        Err(error) => {
-            let error = with_suggestion(error);
-            // Nothing is left to say when this fails too.
-            let _ = error.print();
-            return Err(u8::try_from(error.exit_code()).unwrap_or(2));
-        }
-    };
+    understand(arguments).map_err(|error| {
+        // Nothing is left to say when this fails too.
+        let _ = error.print();
+        u8::try_from(error.exit_code()).unwrap_or(WRONG_INPUT)
+    })
+}
+
+fn understand(arguments: impl IntoIterator<Item = OsString>) -> Result<Task, clap::Error> {
+    let command = Cli::try_parse_from(arguments)
+        .map_err(with_suggestion)?
+        .command;
     let later = |name: &str| Ok(Task::Later(format!("membranes {name}")));
     match command {
         Command::Run(run) if run.threads.is_some() => Ok(Task::Later("--threads".into())),
@@ -153,8 +157,8 @@ fn with_suggestion(mut error: clap::Error) -> clap::Error {
 mod tests {
     use super::*;
 
-    fn parsed(text: &str) -> Result<Task, u8> {
-        parse(text.split_whitespace().map(OsString::from))
+    fn parsed(text: &str) -> Result<Task, i32> {
+        understand(text.split_whitespace().map(OsString::from)).map_err(|e| e.exit_code())
     }
 
     #[test]

@@ -46,7 +46,7 @@ impl Failure {
 
     /// Says it on standard error.
     pub fn print(&self) {
-        eprintln!("{}", self.message);
+        tell(&self.message);
     }
 }
 
@@ -93,9 +93,15 @@ pub fn report_panics() {
             .location()
             .map(|at| format!(" ({}:{})", at.file(), at.line()))
             .unwrap_or_default();
-        eprintln!("error: internal error: {text}{place}");
-        eprintln!("hint: this is a mistake in the program; please report it with the scene");
+        tell(&format!("error: internal error: {text}{place}"));
+        tell("hint: this is a mistake in the program; please report it with the scene");
     }));
+}
+
+/// Prints lines on standard error; a reader that has gone away is no reason to stop.
+pub fn tell(text: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
 /// Prints the result of a command on standard output.

@@ -3,6 +3,7 @@
 use adapt::output::OutputError;
 use adapt::{Level, LevelRecord, Observer, Reason, Recorder};
 
+use crate::failure::tell;
 use crate::number::percent;
 
 /// Hands every level to the recorder and shows its numbers.
@@ -19,9 +20,9 @@ impl Observer for Progress<'_> {
         if !self.quiet {
             let record = &level.record;
             if level.number == 0 {
-                eprintln!("{}", header(record));
+                tell(&header(record));
             }
-            eprintln!("{}", line(record));
+            tell(&line(record));
         }
         Ok(())
     }

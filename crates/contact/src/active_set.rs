@@ -1,11 +1,12 @@
 //! The active set method: solve on a contact set, let go what is pulled, attach what has crossed, until nothing changes.
 //!
-//! At heart the primal-dual method (Hintermueller, Ito, Kunisch 2002): each step solves the linear problem with the gap closed on the contact
-//! set, and ends when no multiplier there is negative and no gap elsewhere. The plain update, release and attach what violates, lets a set that
-//! is too large shrink by one layer of vertices a step, so that from nothing it needs a number of steps like 1/h. Here the next set is read off
-//! after a few projected Gauss-Seidel sweeps from the (projected) iterate, which cost a few per cent of a factorisation and see several layers
-//! at once. Measured with four sweeps: 6 solves instead of 19 from nothing at 66 049 vertices, 2 or 3 instead of 4 or 5
-//! from the contact set of a coarser mesh, at any size.
+//! At heart the primal-dual method (Hintermueller, Ito, Kunisch 2002): each step solves the linear problem with the gap
+//! closed on the contact set, and ends when no multiplier there is negative and no gap elsewhere. The plain update, release
+//! and attach what violates, lets a set that is too large shrink by one layer of vertices a step, so that from nothing it
+//! needs a number of steps like 1/h. Here the next set is read off after a few projected Gauss-Seidel sweeps from the
+//! (projected) iterate, which cost a few per cent of a factorisation and see several layers at once. Measured with four
+//! sweeps: 6 solves instead of 19 from nothing at 66 049 vertices, 2 or 3 instead of 4 or 5 from the contact set of a coarser
+//! mesh, at any size.
 //!
 //! The fields after a solve depend on the set alone, so a set that comes back proves a cycle. Then, and after a long time without
 //! progress, [`crate::monotone`] takes over, which cannot cycle.

@@ -2,7 +2,7 @@
 
 use crate::solution::Status;
 
-/// Why [`crate::solve`] returned no solution.
+/// Why [`crate::solve()`] returned no solution.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SolveError {
     /// An array of the problem or of the start does not have one entry a vertex.

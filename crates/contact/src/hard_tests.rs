@@ -14,7 +14,8 @@ use crate::problem::DiscreteProblem;
 use crate::solution::Status;
 use crate::system::{Fields, System};
 
-/// A stiffness matrix with the signs of random unknowns turned: positive definite, badly conditioned, and half of what couples has the wrong sign.
+/// A stiffness matrix with the signs of random unknowns turned: positive definite, badly conditioned, and half of what
+/// couples has the wrong sign.
 fn turned(matrix: &SymmetricMatrix, share: f64, random: &mut Random) -> SymmetricMatrix {
     let sign: Vec<f64> = (0..matrix.order())
         .map(|_| if random.next() < share { -1.0 } else { 1.0 })

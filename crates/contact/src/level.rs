@@ -11,6 +11,9 @@ use crate::solution::{Reduction, Solution, SolveInfo, Status, kkt_residual};
 use crate::start::Start;
 use crate::system::{Fields, System};
 
+/// Name of the interior-point method in the record.
+pub(crate) const INTERIOR_POINT: &str = "clarabel";
+
 /// Rounding error of a row of a linear system, relative to the sum of the magnitudes of its terms.
 const ROW_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
@@ -261,7 +264,7 @@ fn run(
                 contact: outcome.contact,
                 multiplier: Some(outcome.multiplier),
                 iterations: outcome.iterations,
-                solver: "clarabel",
+                solver: INTERIOR_POINT,
                 status: outcome.status,
             });
         }

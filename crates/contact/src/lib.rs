@@ -1,4 +1,11 @@
 //! The discrete problem of two membranes in unilateral contact, and its solvers.
+//!
+//! [`solve()`] takes a [`DiscreteProblem`] and, from the second mesh on, a [`Start`] carried over from the mesh before; it
+//! returns a [`Solution`] that has been judged by its relative KKT residual. Inside, from the bottom up: `cholesky` (faer's
+//! factorisation), `interior` (the unknowns and the factor that is analysed once), `system` (the inequality in one or two
+//! fields, vertex by vertex), `free` (the linear problem on a fixed contact set), `active_set` and its fallback `monotone`,
+//! `interior_point` (clarabel), `reduce` (the smallest model and the way back), `level` (which model by which method, forces
+//! and sigma).
 
 #[cfg(test)]
 extern crate self as contact;

@@ -1,9 +1,10 @@
 //! The method that cannot fail to converge: projected Gauss-Seidel with a truncated exact correction.
 //!
-//! The truncated nonsmooth Newton multigrid method of Graeser and Kornhuber (2009) with a direct solver in place of the multigrid cycle.
-//! A step relaxes every vertex a few times under its constraint, solves exactly on the vertices whose gap is open, projects
-//! the result to nonnegative gaps, and goes along that direction to the least energy. No part raises the energy, and the
-//! relaxation alone converges for any symmetric positive definite matrix, M-matrix or not; the correction makes it end.
+//! The truncated nonsmooth Newton multigrid method of Graeser and Kornhuber (2009) with a direct solver in place of the
+//! multigrid cycle. A step relaxes every vertex a few times under its constraint, solves exactly on the vertices whose gap is
+//! open, projects the result to nonnegative gaps, and goes along that direction to the least energy. No part raises the
+//! energy, and the relaxation alone converges for any symmetric positive definite matrix, M-matrix or not; the correction
+//! makes it end.
 
 use crate::active_set::{self, Outcome, ROUNDING, SWEEPS};
 use crate::error::SolveError;

@@ -19,8 +19,8 @@ pub enum Tensions {
 
 /// Find nodal u1 >= u2 that minimise the energy, in the matrices of first-order elements.
 ///
-/// With the interior rows of `A_i u_i = F_i +- z`: `A_1 u1 - z = F_1`, `A_2 u2 + z = F_2`, `u1 - u2 >= 0`, `z >= 0`, `z . (u1 - u2) = 0`.
-/// Every array that has one entry a vertex covers boundary vertices too; index 0 is the upper membrane.
+/// With the interior rows of `A_i u_i = F_i +- z`: `A_1 u1 - z = F_1`, `A_2 u2 + z = F_2`, `u1 - u2 >= 0`, `z >= 0`, `z . (u1
+/// - u2) = 0`. Every array that has one entry a vertex covers boundary vertices too; index 0 is the upper membrane.
 #[derive(Clone, Debug)]
 pub struct DiscreteProblem {
     /// Sparsity pattern shared by all matrices.

@@ -1,9 +1,9 @@
 //! The smallest model of a problem, and the way back to the two displacements.
 //!
-//! With tensions t_1 M, t_2 M of one matrix M and theta_i = t_i/(t_1 + t_2), the mean s = theta_1 u1 + theta_2 u2 solves one linear problem,
-//! `M s = (F_1 + F_2)/(t_1 + t_2)`, and the gap w one scalar obstacle problem, `M w - y = F_1/t_1 - F_2/t_2`, `w >= 0`, `y >= 0`. Then
-//! `u1 = s + theta_2 w`, `u2 = s - theta_1 w`, `z = y t_1 t_2/(t_1 + t_2)`. M is K for constant tensions and A_1 for variable tensions in a constant
-//! ratio. No quotient in here overflows before its value does.
+//! With tensions t_1 M, t_2 M of one matrix M and theta_i = t_i/(t_1 + t_2), the mean s = theta_1 u1 + theta_2 u2 solves one
+//! linear problem, `M s = (F_1 + F_2)/(t_1 + t_2)`, and the gap w one scalar obstacle problem, `M w - y = F_1/t_1 - F_2/t_2`,
+//! `w >= 0`, `y >= 0`. Then `u1 = s + theta_2 w`, `u2 = s - theta_1 w`, `z = y t_1 t_2/(t_1 + t_2)`. M is K for constant
+//! tensions and A_1 for variable tensions in a constant ratio. No quotient in here overflows before its value does.
 
 use fem_core::SymmetricMatrix;
 

@@ -3,7 +3,7 @@
 /// Which solver finds the contact set.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Solver {
-    /// Chosen by size and scene.
+    /// The active set method at every size; the interior-point method as a second opinion should it fail.
     #[default]
     Auto,
     /// The interior-point method of the crate clarabel.
@@ -15,14 +15,15 @@ pub enum Solver {
 /// When a level counts as solved.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub enum Tolerance {
-    /// As far as the error estimate needs; a direct solver goes to rounding anyway.
+    /// As far as the error estimate needs; a direct solver goes to rounding anyway. What must be reached at least is
+    /// [`crate::ACTIVE_SET_LIMIT`] or [`crate::INTERIOR_POINT_LIMIT`].
     #[default]
     Balanced,
     /// The relative KKT residual that must be reached.
     Relative(f64),
 }
 
-/// Settings of [`crate::solve`].
+/// Settings of [`crate::solve()`].
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Settings {
     /// Which solver.

@@ -20,9 +20,9 @@ pub struct Start {
 impl Start {
     /// Carries a solution to the refinement of its mesh; O(N).
     ///
-    /// The first `old_vertices` vertices of `mesh` are those of the solution; the others were born as midpoints of two earlier ones, and take
-    /// the mean of their values, exact for first-order functions on a polygon. A new vertex starts in contact when both its parents are;
-    /// a parent on the boundary counts when its gap is zero.
+    /// The first `old_vertices` vertices of `mesh` are those of the solution; the others were born as midpoints of two
+    /// earlier ones, and take the mean of their values, exact for first-order functions on a polygon. A new vertex starts in
+    /// contact when both its parents are; a parent on the boundary counts when its gap is zero.
     pub fn prolong(solution: &Solution, mesh: &Mesh, old_vertices: usize) -> Start {
         let vertices = mesh.vertex_count();
         let boundary = mesh.boundary();

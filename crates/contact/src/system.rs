@@ -82,7 +82,8 @@ impl System<'_> {
         }
     }
 
-    /// The multiplier that holds a vertex in contact, from the row of the softer membrane: the stiffer one loses digits like the ratio.
+    /// The multiplier that holds a vertex in contact, from the row of the softer membrane: the stiffer one loses digits like
+    /// the ratio.
     #[inline]
     pub fn multiplier(&self, u: &Fields, j: usize) -> f64 {
         if self.is_pair() && self.matrices[1].diagonal(j) < self.matrices[0].diagonal(j) {

@@ -42,6 +42,12 @@ pub enum MeshError {
         /// The other end.
         b: u32,
     },
+    /// Given refinement edges that wait for each other.
+    #[error("the refinement edges from triangle {triangle} on run in a circle")]
+    CyclicRefinementEdges {
+        /// A triangle on the circle, counted from 0.
+        triangle: usize,
+    },
     /// Too many triangles for 32-bit numbers.
     #[error("{triangles} triangles are more than the {limit} that a mesh can hold")]
     TooLarge {

@@ -125,6 +125,34 @@ impl Mesh {
         regions: &[i32],
         curve: Option<Circle>,
     ) -> Result<Mesh, MeshError> {
+        Mesh::build(points, triangles, regions, curve, longest_edge_first)
+    }
+
+    /// Builds an initial mesh whose triangles name their refinement edges: their first two vertices.
+    ///
+    /// # Errors
+    /// As [`Mesh::new`], and [`MeshError::CyclicRefinementEdges`] when the chain of refinement edges runs in a circle, so that none of the
+    /// triangles on it could be bisected first.
+    pub fn with_refinement_edges(
+        points: Vec<[f64; 2]>,
+        triangles: &[[u32; 3]],
+        regions: &[i32],
+        curve: Option<Circle>,
+    ) -> Result<Mesh, MeshError> {
+        let mesh = Mesh::build(points, triangles, regions, curve, |v, _| v)?;
+        match cycle(&mesh.topology.neighbours) {
+            Some(triangle) => Err(MeshError::CyclicRefinementEdges { triangle }),
+            None => Ok(mesh),
+        }
+    }
+
+    fn build(
+        points: Vec<[f64; 2]>,
+        triangles: &[[u32; 3]],
+        regions: &[i32],
+        curve: Option<Circle>,
+        refinement_edge_first: impl Fn([u32; 3], &[[f64; 2]]) -> [u32; 3],
+    ) -> Result<Mesh, MeshError> {
         if triangles.is_empty() {
             return Err(MeshError::Empty);
         }
@@ -155,7 +183,7 @@ impl Mesh {
                 return Err(MeshError::Degenerate { triangle: t, area });
             }
             let v = if area < 0.0 { [v[1], v[0], v[2]] } else { *v };
-            oriented.push(longest_edge_first(v, &points).map(VertexId));
+            oriented.push(refinement_edge_first(v, &points).map(VertexId));
         }
         if let Some(vertex) = used.iter().position(|u| !u) {
             return Err(MeshError::UnusedVertex { vertex });
@@ -259,6 +287,29 @@ fn longest_edge_first(v: [u32; 3], points: &[[f64; 2]]) -> [u32; 3] {
         }
     }
     [v[best], v[(best + 1) % 3], v[(best + 2) % 3]]
+}
+
+/// A triangle on a closed chain of refinement edges, if there is one; O(N).
+///
+/// A triangle waits for the neighbour behind its refinement edge, unless that is the neighbour's refinement edge too.
+fn cycle(neighbours: &[[Neighbour; 3]]) -> Option<usize> {
+    // 0: not seen, else the number of the walk that saw it.
+    let mut seen = vec![0u32; neighbours.len()];
+    for start in 0..neighbours.len() {
+        let walk = start as u32 + 1;
+        let mut t = start;
+        while seen[t] == 0 {
+            seen[t] = walk;
+            match neighbours[t][2].get() {
+                Some((next, face)) if face != 2 => t = next.index(),
+                _ => break,
+            }
+            if seen[t] == walk {
+                return Some(t);
+            }
+        }
+    }
+    None
 }
 
 /// Finds the neighbours by sorting every edge into the bucket of its lower vertex; O(N).

@@ -134,6 +134,22 @@ fn ninety_halvings_at_the_origin_and_a_clear_refusal_elsewhere() {
     );
 }
 
+#[test]
+fn refinement_edges_that_wait_for_each_other_are_refused() {
+    let points = vec![[0.0, 0.0], [2.0, 0.0], [1.0, 2.0], [1.0, 0.7]];
+    let circle = [[0, 3, 1], [1, 3, 2], [2, 3, 0]];
+    let error = Mesh::with_refinement_edges(points.clone(), &circle, &[], None).map(|_| ());
+    assert_eq!(
+        error,
+        Err(fem_core::MeshError::CyclicRefinementEdges { triangle: 0 })
+    );
+    let rim = [[0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    let mut mesh = Mesh::with_refinement_edges(points, &rim, &[], None).expect("no circle");
+    assert_eq!(mesh.triangles()[1].map(|v| v.0), [1, 2, 3]);
+    mesh.refine_uniformly(Children::Four).expect("refines");
+    check(&mesh).expect("sound");
+}
+
 /// Work of the closure for each new triangle, refining towards a circle.
 #[test]
 fn closure_work_for_each_new_triangle_is_constant() {

@@ -22,7 +22,12 @@ fn polynomials_are_integrated_exactly() {
     let f = |x: f64, y: f64| 3.0 * x.powi(4) - x * y * y + 2.0;
     let l = loads(&mesh, &f).expect("finite");
     // Against the affine function 1 + x, whose nodal values are known: degree five in all.
-    let paired: f64 = l.nodal.iter().zip(mesh.points()).map(|(m, p)| m * (1.0 + p[0])).sum();
+    let paired: f64 = l
+        .nodal
+        .iter()
+        .zip(mesh.points())
+        .map(|(m, p)| m * (1.0 + p[0]))
+        .sum();
     let exact = 3.0 * 4.0 / 5.0 + 2.0 * 4.0 - 4.0 / 9.0;
     assert!((paired - exact).abs() < 1e-14, "{paired} {exact}");
     let squares: f64 = l.deviation_squared.iter().sum::<f64>();
@@ -42,11 +47,17 @@ fn a_jump_inside_elements_is_followed() {
     for level in 1..6 {
         let mesh = square(level);
         let l = loads(&mesh, &step).expect("finite");
-        assert!((total(&l.nodal) - exact).abs() < 3e-4, "{level}: {}", total(&l.nodal) - exact);
+        assert!(
+            (total(&l.nodal) - exact).abs() < 3e-4,
+            "{level}: {}",
+            total(&l.nodal) - exact
+        );
         // ||f||^2 = sum of means squared and deviations: the same number, since f is 0 or 1.
         let norm: f64 = mesh
             .triangle_ids()
-            .map(|t| mesh.shape(t).area * l.mean[t.index()].powi(2) + l.deviation_squared[t.index()])
+            .map(|t| {
+                mesh.shape(t).area * l.mean[t.index()].powi(2) + l.deviation_squared[t.index()]
+            })
             .sum();
         assert!((norm - exact).abs() < 3e-4, "{level}: {}", norm - exact);
     }
@@ -62,9 +73,17 @@ fn a_singular_corner_is_graded() {
     let n = 2000;
     let h = std::f64::consts::FRAC_PI_4 / n as f64;
     let g = |i: usize| (i as f64 * h).cos().powf(-5.0 / 3.0);
-    let simpson: f64 = (0..n / 2).map(|i| g(2 * i) + 4.0 * g(2 * i + 1) + g(2 * i + 2)).sum::<f64>() * h / 3.0;
+    let simpson: f64 = (0..n / 2)
+        .map(|i| g(2 * i) + 4.0 * g(2 * i + 1) + g(2 * i + 2))
+        .sum::<f64>()
+        * h
+        / 3.0;
     let exact = 8.0 * 0.6 * simpson;
-    assert!((total(&l.nodal) / exact - 1.0).abs() < 1e-5, "{} {exact}", total(&l.nodal));
+    assert!(
+        (total(&l.nodal) / exact - 1.0).abs() < 1e-5,
+        "{} {exact}",
+        total(&l.nodal)
+    );
 }
 
 #[test]
@@ -72,15 +91,32 @@ fn means_of_smooth_tensions_have_ten_digits() {
     let mesh = square(2);
     let mu = |x: f64, y: f64| (0.7 * x - y).exp();
     let m = means(&mesh, &mu).expect("finite");
-    let whole: f64 = mesh.triangle_ids().map(|t| mesh.shape(t).area * m[t.index()]).sum();
+    let whole: f64 = mesh
+        .triangle_ids()
+        .map(|t| mesh.shape(t).area * m[t.index()])
+        .sum();
     let exact = (2.0 * 0.7f64.sinh() / 0.7) * 2.0 * 1f64.sinh();
-    assert!((whole / exact - 1.0).abs() < 1e-11, "{}", whole / exact - 1.0);
+    assert!(
+        (whole / exact - 1.0).abs() < 1e-11,
+        "{}",
+        whole / exact - 1.0
+    );
     let aligned = means(&mesh, &|x: f64, _: f64| if x > 0.0 { 1e4 } else { 1.0 }).expect("finite");
     assert!(aligned.iter().all(|&m| m == 1.0 || m == 1e4));
-    let cut = means(&mesh, &|x: f64, _: f64| if x > 1.0 / 3.0 { 1e4 } else { 1.0 }).expect("finite");
-    let whole: f64 = mesh.triangle_ids().map(|t| mesh.shape(t).area * cut[t.index()]).sum();
+    let cut = means(&mesh, &|x: f64, _: f64| {
+        if x > 1.0 / 3.0 { 1e4 } else { 1.0 }
+    })
+    .expect("finite");
+    let whole: f64 = mesh
+        .triangle_ids()
+        .map(|t| mesh.shape(t).area * cut[t.index()])
+        .sum();
     let exact = 2.0 * (4.0 / 3.0 + 1e4 * 2.0 / 3.0);
-    assert!((whole / exact - 1.0).abs() < 2e-3, "{}", whole / exact - 1.0);
+    assert!(
+        (whole / exact - 1.0).abs() < 2e-3,
+        "{}",
+        whole / exact - 1.0
+    );
 }
 
 /// Counts its samples.
@@ -88,7 +124,8 @@ struct Counting(std::sync::atomic::AtomicUsize);
 
 impl Field for Counting {
     fn sample(&self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
-        self.0.fetch_add(at.len(), std::sync::atomic::Ordering::Relaxed);
+        self.0
+            .fetch_add(at.len(), std::sync::atomic::Ordering::Relaxed);
         for (k, v) in out.iter_mut().enumerate() {
             *v = (at.x[k] + 2.0 * at.y[k]).sin();
         }
@@ -106,6 +143,7 @@ fn smooth_data_on_a_fine_mesh_cost_seven_points() {
 
 #[test]
 fn a_value_that_is_not_finite_says_where() {
-    let error = loads(&square(3), &|x: f64, _: f64| 1.0 / (x - 0.5).max(0.0)).expect_err("infinite left of 0.5");
+    let error = loads(&square(3), &|x: f64, _: f64| 1.0 / (x - 0.5).max(0.0))
+        .expect_err("infinite left of 0.5");
     assert!(error.value.is_infinite() && error.x <= 0.5, "{error}");
 }
