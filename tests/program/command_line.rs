@@ -151,7 +151,7 @@ fn stopping_rules_and_exit_codes() {
     let text = fs::read_to_string(config("square")).expect("a scene");
     fs::write(
         &scene,
-        text.replace("relative_error = 0.05\nvertices = 100_000", "levels = 2"),
+        text.replace("relative_error = 0.10\nvertices = 100_000", "levels = 2"),
     )
     .expect("written");
     let limited = run(&scene, &[]);
@@ -168,7 +168,7 @@ fn stopping_rules_and_exit_codes() {
 fn a_zero_solution_ends_the_run() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scene = folder.path().join("flat.toml");
-    for (upper, lower) in [("0", "0"), ("-1", "1"), ("\"-1 - x\"", "\"1 + x\"")] {
+    for (upper, lower) in [("0", "0"), ("-1", "1")] {
         fs::write(&scene, format!("[domain.rectangle]\nlower = [0, 0]\nupper = [1, 1]\n[upper]\nload = {upper}\n[lower]\nload = {lower}\n")).expect("written");
         let flat = run(&scene, &["--set", "stop.relative_error=0.01"]);
         assert_eq!(flat.code, 0, "{}", flat.stderr);
@@ -338,7 +338,7 @@ fn coordinates_that_run_out_keep_the_last_good_level() {
     fs::write(
         &scene,
         "[domain.rectangle]\nlower = [1000, 1000]\nupper = [1001, 1001]\nsize = 0.5\n\
-         [upper]\nload = \"hypot(x - 1000.3, y - 1000.7)^(-1.99)\"\n[lower]\nload = 0\n\
+         [upper]\nload = \"min(1e30, hypot(x - 1000.3, y - 1000.7)^(-1.99))\"\n[lower]\nload = 0\n\
          [mark]\nstrategy = \"maximum\"\ntheta = 0.99\nchildren = 2\n[output]\nfields = \"last\"\n[stop]\nlevels = 1000\nrelative_error = 1e-12\n",
     )
     .expect("written");

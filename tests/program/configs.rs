@@ -111,7 +111,7 @@ fn two_diaphragms_under_pressure() {
     let summary = run.summary();
     assert_eq!(summary["outcome"], "goal");
     assert_eq!(summary["reduction"], "two-field");
-    // No closed solution: the numbers are those of the same scene at a goal of 2 % (`--set stop.relative_error=0.02`).
+    // No closed solution: the numbers are those of the same scene at a goal of 3 % (`--set stop.relative_error=0.03 --set stop.vertices=1000000`).
     near(
         "contact area",
         number(&run, "contact_area"),
@@ -127,5 +127,5 @@ fn two_diaphragms_under_pressure() {
     assert!(number(&run, "max_action") > 0.0);
 }
 
-const FINE_AREA: f64 = 1.0;
-const FINE_FORCE: f64 = 1.0;
+const FINE_AREA: f64 = 1.361e-3;
+const FINE_FORCE: f64 = 0.5417;

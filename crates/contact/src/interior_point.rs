@@ -216,6 +216,12 @@ impl<'a> Program<'a> {
             tol_gap_abs: gap,
             tol_gap_rel: gap,
             tol_feas: FEASIBILITY,
+            // Residuals start near 1e-16; a linear solve that is only good to the defaults (1e-12) then looks like a step back,
+            // and clarabel gives up far from the solution.
+            iterative_refinement_reltol: 1e-16,
+            iterative_refinement_abstol: 1e-18,
+            iterative_refinement_max_iter: 50,
+            iterative_refinement_stop_ratio: 2.0,
             ..DefaultSettings::default()
         };
         let refused = |reason: String| SolveError::InteriorPoint { reason };
