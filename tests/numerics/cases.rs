@@ -142,10 +142,12 @@ pub fn on(name: &str, grid: &Grid, refinements: usize) -> Problem {
 
 /// Both estimators, no files, `levels` levels of uniform refinement.
 pub fn uniform(levels: usize) -> Settings {
-    let mut settings = Settings::default();
-    settings.estimate = Estimate {
-        estimator: Estimator::Residual,
-        also: vec![Estimator::Paper],
+    let mut settings = Settings {
+        estimate: Estimate {
+            estimator: Estimator::Residual,
+            also: vec![Estimator::Paper],
+        },
+        ..Settings::default()
     };
     settings.mark.strategy = Strategy::Uniform;
     settings.stop = Stop {

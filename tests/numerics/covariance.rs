@@ -13,7 +13,8 @@ fn over_length(expression: &str) -> String {
     let word = |b: u8| b.is_ascii_alphanumeric() || b == b'_';
     let mut result = String::new();
     for (i, c) in expression.char_indices() {
-        let alone = !(i > 0 && word(bytes[i - 1])) && !bytes.get(i + 1).is_some_and(|&b| word(b));
+        let inside = |at: Option<usize>| at.and_then(|at| bytes.get(at)).is_some_and(|&b| word(b));
+        let alone = !inside(i.checked_sub(1)) && !inside(Some(i + 1));
         match c {
             'x' | 'y' if alone => result.push_str(&format!("({c}/L)")),
             _ => result.push(c),

@@ -177,6 +177,22 @@ fn a_zero_solution_ends_the_run() {
 }
 
 #[test]
+fn a_load_that_the_mesh_does_not_see_is_no_goal() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = folder.path().join("waves.toml");
+    // The load has mean zero over every initial triangle and against every initial hat function.
+    fs::write(
+        &scene,
+        "[domain.rectangle]\nlower = [0, 0]\nupper = [2, 2]\nsize = 0.5\n[upper]\nload = \"1000*sin(8*pi*x)*sin(8*pi*y)\"\nboundary = 100\n\
+         [stop]\nrelative_error = 0.1\nlevels = 3\n",
+    )
+    .expect("written");
+    let run = run(&scene, &[]);
+    assert_eq!(run.code, 5, "{}", run.stdout);
+    assert_eq!(run.summary()["levels"], 3);
+}
+
+#[test]
 fn estimators_that_were_not_asked_for_leave_no_trace() {
     let run = run(
         &config("no-contact"),
@@ -337,8 +353,8 @@ fn coordinates_that_run_out_keep_the_last_good_level() {
     // All load sits at a point far from the origin: refinement goes on until the edges there cannot be halved.
     fs::write(
         &scene,
-        "[domain.rectangle]\nlower = [1000, 1000]\nupper = [1001, 1001]\nsize = 0.5\n\
-         [upper]\nload = \"min(1e30, hypot(x - 1000.3, y - 1000.7)^(-1.99))\"\n[lower]\nload = 0\n\
+        "[domain.rectangle]\nlower = [1e12, 1e12]\nupper = [1000000000001, 1000000000001]\nsize = 0.5\n\
+         [upper]\nload = \"min(1e30, hypot(x - 1e12 - 0.3, y - 1e12 - 0.7)^(-1.99))\"\n[lower]\nload = 0\n\
          [mark]\nstrategy = \"maximum\"\ntheta = 0.99\nchildren = 2\n[output]\nfields = \"last\"\n[stop]\nlevels = 1000\nrelative_error = 1e-12\n",
     )
     .expect("written");

@@ -20,7 +20,7 @@ const KNOWN: [Known; 6] = [
         reduction: "constant-tensions",
         area: Some((0.5 * PI, 0.05)),
         force: Some((0.05 * PI, 0.01)),
-        effectivity: Some((3.5, 4.5)),
+        effectivity: Some((5.0, 6.5)),
     },
     Known {
         name: "square",

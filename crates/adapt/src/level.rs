@@ -44,7 +44,7 @@ pub struct Estimates {
     pub errors: Option<TrueErrors>,
     /// Squares that triangles are marked by: the driving estimator and the oscillation.
     pub marking: Vec<f64>,
-    /// The largest contribution of the loads to the driving estimator, before anything cancels.
+    /// The largest contribution h_K |K|^(1/2) |f_ih| of the loads to the driving estimator, before anything cancels.
     pub largest_contribution: f64,
     /// J(u_h) and |||u_h|||.
     pub energy: Energy,
@@ -167,6 +167,7 @@ impl Estimates {
             )?),
             None => None,
         };
+        let weighted = settings.estimate.estimator == Estimator::Residual;
         // The driving estimator was asked for, so it is there.
         let (marking, bound): (Vec<f64>, f64) =
             match (settings.estimate.estimator, &paper, &residual) {
@@ -187,7 +188,10 @@ impl Estimates {
                         let h = mesh.shape(t).diameter();
                         e * e
                             + [0, 1]
-                                .map(|i| load_square(discrete, i, t.index(), h, 0.0, true))
+                                .map(|i| {
+                                    h * h * discrete.loads[i].deviation_squared[t.index()]
+                                        / tension_weight(discrete, i, t.index(), true)
+                                })
                                 .iter()
                                 .sum::<f64>()
                     });
@@ -197,18 +201,12 @@ impl Estimates {
         let mut largest = 0.0f64;
         for t in mesh.triangle_ids() {
             let shape = mesh.shape(t);
-            let weighted = settings.estimate.estimator == Estimator::Residual;
-            let squares = [0, 1].map(|i| {
-                load_square(
-                    discrete,
-                    i,
-                    t.index(),
-                    shape.diameter(),
-                    shape.area,
-                    weighted,
-                )
+            let weight = shape.diameter().powi(2) * shape.area;
+            let square = [0, 1].map(|i| {
+                let mean = discrete.loads[i].mean[t.index()];
+                weight * mean * mean / tension_weight(discrete, i, t.index(), weighted)
             });
-            largest = largest.max(squares[0] + squares[1]);
+            largest = largest.max(square[0] + square[1]);
         }
         Ok(Estimates {
             paper,
@@ -223,24 +221,18 @@ impl Estimates {
     }
 }
 
-/// h^2 (||f - f_h||^2 + area f_h^2) of one membrane on one triangle, over the tension where the energy norm is estimated.
-fn load_square(
+/// The tension that the squares of an estimator of the energy norm are divided by; 1 for the paper's.
+fn tension_weight(
     discrete: &DiscreteProblem,
     membrane: usize,
     triangle: usize,
-    diameter: f64,
-    area: f64,
-    over_tension: bool,
+    weighted: bool,
 ) -> f64 {
-    let loads = &discrete.loads[membrane];
-    let square =
-        loads.deviation_squared[triangle] + area * loads.mean[triangle] * loads.mean[triangle];
-    let weight = if over_tension {
+    if weighted {
         discrete.tension_mean[membrane][triangle]
     } else {
         1.0
-    };
-    diameter * diameter * square / weight
+    }
 }
 
 /// Puts the scale back: the numbers of a level in the user's units.
@@ -277,7 +269,9 @@ fn record(
         unknowns: solution.info.unknowns,
         contact_vertices: in_contact().count(),
         contact_area: by(
-            in_contact().map(|j| discrete.dual_area[j]).sum(),
+            in_contact()
+                .map(|j| discrete.dual_area[j])
+                .fold(0.0, |a, b| a + b),
             scale.area(),
         ),
         energy: by(energy, scale.energy()),
@@ -306,7 +300,7 @@ fn record(
         reduction: solution.info.reduction,
         iterations: solution.info.iterations,
         kkt_residual: solution.info.kkt_residual,
-        contact_force: by(solution.force.iter().sum(), scale.force()),
+        contact_force: by(solution.force.iter().fold(0.0, |a, b| a + b), scale.force()),
         max_action: by(pressures.fold(0.0, f64::max), scale.load),
         smallest_gap: by(
             (0..mesh.vertex_count())

@@ -3,8 +3,8 @@
 use adapt::output::OutputError;
 use adapt::output::columns::reduction_name;
 use adapt::settings::{Stop, Strategy};
-use adapt::{Level, LevelError, LevelRecord, Observer, Reason};
-use contact::Reduction;
+use adapt::{Level, LevelError, Observer, Reason};
+use contact::{Reduction, Tensions};
 use scene::Scene;
 use serde_json::{Value, json};
 
@@ -35,7 +35,7 @@ pub fn check(arguments: &CheckArgs) -> Result<u8, Failure> {
 }
 
 /// Solves the initial mesh.
-fn first_level(scene: &Scene) -> Result<LevelRecord, Failure> {
+fn first_level(scene: &Scene) -> Result<Level, Failure> {
     struct Blind;
     impl Observer for Blind {
         fn level(&mut self, _: &Level, _: Option<Reason>) -> Result<(), OutputError> {
@@ -48,7 +48,7 @@ fn first_level(scene: &Scene) -> Result<LevelRecord, Failure> {
         ..Stop::default()
     };
     match adapt::run(&scene.problem, &settings, &mut Blind) {
-        Ok(outcome) => Ok(outcome.level.record),
+        Ok(outcome) => Ok(outcome.level),
         Err(error) => Err(match error.cause {
             LevelError::Data(data) => scene.data_error(&data).into(),
             cause => Failure::new(NUMERICAL, format!("on the initial mesh: {cause}"), None),
@@ -56,17 +56,23 @@ fn first_level(scene: &Scene) -> Result<LevelRecord, Failure> {
     }
 }
 
-/// The model that the tensions alone allow.
-fn model(scene: &Scene) -> Reduction {
+/// The model that the tensions alone allow: as the initial mesh saw them if it was solved, else by their samples.
+fn model(scene: &Scene, first: Option<&Level>) -> Reduction {
     let overview = &scene.overview;
+    let (constant, ratio) = match first.map(|first| first.discrete.tensions) {
+        Some(Tensions::Constant(..)) => (true, true),
+        Some(Tensions::Ratio(_)) => (false, true),
+        Some(Tensions::General) => (false, false),
+        None => (overview.constant_tensions, overview.constant_ratio),
+    };
     match scene.settings.solve.reduce {
-        true if overview.constant_tensions => Reduction::ConstantTensions,
-        true if overview.constant_ratio => Reduction::ConstantRatio,
+        true if constant => Reduction::ConstantTensions,
+        true if ratio => Reduction::ConstantRatio,
         _ => Reduction::TwoField,
     }
 }
 
-fn text(scene: &Scene, first: Option<&LevelRecord>) -> String {
+fn text(scene: &Scene, first: Option<&Level>) -> String {
     let overview = &scene.overview;
     let settings = &scene.settings;
     let mut lines = Vec::new();
@@ -88,7 +94,7 @@ fn text(scene: &Scene, first: Option<&LevelRecord>) -> String {
     };
     let [upper, lower] = overview.tension.map(range);
     line("tensions", format!("upper {upper}, lower {lower}"));
-    let model = model(scene);
+    let model = model(scene, first);
     let explained = match model {
         Reduction::ConstantTensions => "one linear and one scalar obstacle problem",
         Reduction::ConstantRatio => {
@@ -105,7 +111,7 @@ fn text(scene: &Scene, first: Option<&LevelRecord>) -> String {
             names::tolerance(settings.solve.tolerance)
         ),
     );
-    if let Some(first) = first {
+    if let Some(first) = first.map(|level| &level.record) {
         line(
             "",
             format!(
@@ -165,7 +171,7 @@ fn estimators(scene: &Scene) -> String {
     text
 }
 
-fn object(scene: &Scene, first: Option<&LevelRecord>) -> Value {
+fn object(scene: &Scene, first: Option<&Level>) -> Value {
     let overview = &scene.overview;
     let settings = &scene.settings;
     let also: Vec<&str> = settings
@@ -185,10 +191,10 @@ fn object(scene: &Scene, first: Option<&LevelRecord>) -> Value {
         "triangles": overview.triangles,
         "smallest_angle": overview.smallest_angle,
         "tension": { "upper": overview.tension[0], "lower": overview.tension[1] },
-        "model": reduction_name(model(scene)),
+        "model": reduction_name(model(scene, first)),
         "solver": names::solver(settings.solve.solver),
         "tolerance": names::tolerance(settings.solve.tolerance),
-        "initial_mesh": first.map(|first| json!({
+        "initial_mesh": first.map(|level| &level.record).map(|first| json!({
             "reduction": reduction_name(first.reduction),
             "solver": first.solver,
             "contact_vertices": first.contact_vertices,

@@ -17,7 +17,8 @@ pub fn solver(solver: Solver) -> &'static str {
 pub fn tolerance(tolerance: Tolerance) -> String {
     match tolerance {
         Tolerance::Balanced => "balanced".into(),
-        Tolerance::Relative(value) => value.to_string(),
+        // With an exponent where it is small.
+        Tolerance::Relative(value) => format!("{value:?}"),
     }
 }
 
@@ -68,4 +69,16 @@ pub fn rules(stop: &Stop) -> Vec<(&'static str, Value)> {
     .into_iter()
     .filter_map(|(name, value)| Some((name, value?)))
     .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tolerances_are_short() {
+        for (value, text) in [(1e-10, "1e-10"), (2.5e-7, "2.5e-7"), (0.001, "0.001")] {
+            assert_eq!(tolerance(Tolerance::Relative(value)), text);
+        }
+    }
 }

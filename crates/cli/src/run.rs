@@ -120,15 +120,19 @@ fn final_line(ending: Ending, levels: &[LevelRecord], out: &Path) -> String {
         .relative_bound
         .map(|relative| format!(" ({})", percent(relative)))
         .unwrap_or_default();
+    let count = match levels.len() {
+        1 => "1 level".to_owned(),
+        n => format!("{n} levels"),
+    };
     format!(
-        "{}: bound {}{relative}, contact area {}, contact force {}, largest pressure {}, smallest gap {}, {} levels, {} vertices, {}",
+        "{}: bound {}{relative}, contact area {}, contact force {}, largest pressure {}, smallest gap {}, {}, {} vertices, {}",
         ending.name(),
         short(last.error_bound),
         short(last.contact_area),
         short(last.contact_force),
         short(last.max_action),
         short(last.smallest_gap),
-        levels.len(),
+        count,
         last.vertices,
         out.display(),
     )

@@ -30,7 +30,7 @@ pub use error::SolveError;
 pub use problem::{DiscreteProblem, Tensions};
 pub use settings::{Settings, Solver, Tolerance};
 pub use solution::{Reduction, Solution, SolveInfo, Status, kkt_residual, rounding_residual};
-pub use solve::{ACTIVE_SET_LIMIT, INTERIOR_POINT_LIMIT, solve};
+pub use solve::{ACTIVE_SET_LIMIT, INTERIOR_POINT_LIMIT, ROUNDING_LIMIT, solve};
 pub use start::Start;
 
 #[cfg(test)]

@@ -110,4 +110,4 @@ impl Tensions {
 }
 
 /// How far the quotient of the element means may vary and still count as constant.
-const RATIO_TOLERANCE: f64 = 1e-14;
+const RATIO_TOLERANCE: f64 = 1e-13;

@@ -16,6 +16,9 @@ pub const ACTIVE_SET_LIMIT: f64 = 1e-9;
 /// with 1e12 it may fail.
 pub const INTERIOR_POINT_LIMIT: f64 = 1e-6;
 
+/// Where rounding allows no better the limits give way, but never beyond this relative KKT residual.
+pub const ROUNDING_LIMIT: f64 = 1e-3;
+
 /// Solves the discrete problem, from a start on the same mesh ([`Start::prolong`]) or from nothing.
 ///
 /// With `settings.reduce` the smallest model is taken that the tensions allow, and the contact set that is found decides what
@@ -31,7 +34,7 @@ pub const INTERIOR_POINT_LIMIT: f64 = 1e-6;
 /// interior-point method gives a second opinion, and the smaller KKT residual wins.
 ///
 /// Under [`Tolerance::Balanced`] the limits are [`ACTIVE_SET_LIMIT`] and [`INTERIOR_POINT_LIMIT`], or what rounding alone
-/// allows where that is more ([`rounding_residual`]): a soft membrane pressed hard against a stiff one has loads so much
+/// allows where that is more ([`rounding_residual`], at most [`ROUNDING_LIMIT`]): a soft membrane pressed hard against a stiff one has loads so much
 /// larger than its stiffness times its displacement that no iterate in double precision does better.
 ///
 /// # Errors
@@ -85,11 +88,8 @@ fn judge(
             } else {
                 ACTIVE_SET_LIMIT
             };
-            limit.max(rounding_residual(
-                problem,
-                &solution.displacement,
-                &solution.force,
-            ))
+            let rounding = rounding_residual(problem, &solution.displacement, &solution.force);
+            limit.max(rounding.min(ROUNDING_LIMIT))
         }
     };
     if residual.is_finite() && residual <= tolerance {

@@ -25,7 +25,8 @@ pub struct Scene {
     pub problem: Problem,
     /// How it is to be run.
     pub settings: Settings,
-    /// The text of the scene as it is run: overrides put in, comments kept.
+    /// The text of the scene as it is run: overrides put in, comments kept; after [`load`](crate::load) with an absolute
+    /// path of the mesh file.
     pub text: String,
     /// What `membranes check` tells of it.
     pub overview: Overview,
@@ -108,9 +109,9 @@ pub struct Overview {
     pub smallest_angle: f64,
     /// Smallest and largest tension met, of the upper and the lower membrane.
     pub tension: [[f64; 2]; 2],
-    /// Whether the tensions are the same everywhere.
+    /// Whether the tensions are constants.
     pub constant_tensions: bool,
-    /// Whether their quotient is.
+    /// Whether their quotient is the same at all points sampled.
     pub constant_ratio: bool,
     /// Whether an exact solution is given.
     pub exact: bool,

@@ -11,6 +11,7 @@ mod domain_mesh;
 mod error;
 mod fields;
 mod geometry;
+mod mesh_file;
 mod overrides;
 mod parse;
 mod reader;
@@ -30,13 +31,19 @@ use source::Sources;
 
 /// Reads, checks and builds the scene file at `path`, with overrides `KEY=VALUE` applied.
 ///
+/// The text of the scene names its mesh file, if it has one, by an absolute path: it can be run from any folder.
+///
 /// # Errors
 /// The first thing that is wrong with the file, an override, the mesh file it names or the problem they describe.
 pub fn load(path: &Path, overrides: &[String]) -> Result<Scene, SceneError> {
     let name = path.display().to_string();
     let text = read_text(path, &name)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    from_text(&text, &name, folder, overrides)
+    let mut scene = from_text(&text, &name, folder, overrides)?;
+    if let Some(text) = mesh_file::absolute(&scene.text, folder) {
+        scene.text = text;
+    }
+    Ok(scene)
 }
 
 /// As [`load`], for a text that messages call `name`; mesh files are relative to `folder`.

@@ -112,6 +112,33 @@ fn a_mesh_file_is_found_beside_the_scene_and_its_regions_are_seen() {
 }
 
 #[test]
+fn the_text_of_a_scene_with_a_mesh_file_runs_from_another_folder() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    fs::create_dir(folder.path().join("out")).expect("a folder");
+    fs::write(folder.path().join("plate.msh"), MESH).expect("written");
+    let path = folder.path().join("scene.toml");
+    let text =
+        |file: &str| format!("# plate\r\n[domain.mesh]\nfile =  {file} # here\n\n[upper]\nload=-1");
+    let file = std::path::absolute(folder.path().join("plate.msh")).expect("a path");
+    let overrides = ["domain.mesh.file=plate.msh".to_owned()];
+    for (written, overrides) in [("'plate.msh'", &[][..]), ("'none.msh'", &overrides)] {
+        fs::write(&path, text(written)).expect("written");
+        let scene = load(&path, overrides).unwrap_or_else(|e| panic!("{e}"));
+        if overrides.is_empty() {
+            assert_eq!(scene.text, text(&format!("\"{}\"", file.display())));
+        }
+        let copy = folder.path().join("out/scene.toml");
+        fs::write(&copy, &scene.text).expect("written");
+        let again = load(&copy, &[]).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(again.problem.mesh.region(), [7, 8]);
+        assert_eq!(again.text, scene.text);
+    }
+    // A text without a file of its own stays as it is.
+    let scene = from_text(&text("'plate.msh'"), "scene.toml", folder.path(), &[]);
+    assert_eq!(scene.ok().expect("a scene").text, text("'plate.msh'"));
+}
+
+#[test]
 fn files_that_are_no_scene() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let refused = |name: &str| {
