@@ -85,6 +85,9 @@ struct Part {
 
 const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
+/// A piece is quartered only if its width exceeds this many spacings of the coordinates.
+const SPACINGS: f64 = 64.0;
+
 /// Pieces that are sampled together.
 const BLOCK: usize = 64;
 
@@ -132,6 +135,13 @@ pub fn integrate(
             },
         )?;
     }
+    // Below a few spacings of the coordinates' double precision the samples are noise, and quartering it would not end.
+    let extent = mesh
+        .points()
+        .iter()
+        .flatten()
+        .fold(0.0f64, |m, x| m.max(x.abs()));
+    let smallest = (SPACINGS * f64::EPSILON * extent).powi(2);
     let allowed = |t: usize| {
         control.tolerance
             * if control.local {
@@ -166,9 +176,8 @@ pub fn integrate(
                 &mut |integrand, piece, part| {
                     let judgement = integrand.judge(piece);
                     let coarse = piece.area > control.largest_share * total_area;
-                    if part.depth < control.depth
-                        && (coarse || judgement.error > allowed(piece.triangle))
-                    {
+                    let divisible = part.depth < control.depth && piece.area > smallest;
+                    if divisible && (coarse || judgement.error > allowed(piece.triangle)) {
                         quarter(part, &mut stack);
                     } else {
                         integrand.add(piece);

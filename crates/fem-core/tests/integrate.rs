@@ -141,6 +141,31 @@ fn smooth_data_on_a_fine_mesh_cost_seven_points() {
     assert_eq!(f.0.into_inner(), 7 * mesh.triangle_count());
 }
 
+/// Far from the origin quarters of quarters collapse to a few points; sampling them ever more finely once cost seconds.
+#[test]
+fn quartering_ends_at_the_spacing_of_the_coordinates() {
+    let far = 1e14;
+    let points = square(3)
+        .points()
+        .iter()
+        .map(|p| p.map(|x| far + x))
+        .collect();
+    let triangles: Vec<_> = square(3)
+        .triangles()
+        .iter()
+        .map(|t| t.map(|v| v.0))
+        .collect();
+    let mesh = Mesh::new(points, &triangles, &[], None).expect("far away");
+    let samples = std::sync::atomic::AtomicUsize::new(0);
+    let singular = |x: f64, y: f64| {
+        samples.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        (x - far - 0.3).hypot(y - far - 0.7).powf(-1.99).min(1e30)
+    };
+    loads(&mesh, &singular).expect("finite");
+    let samples = samples.into_inner();
+    assert!(samples < 1_000_000, "{samples}");
+}
+
 #[test]
 fn a_value_that_is_not_finite_says_where() {
     let error = loads(&square(3), &|x: f64, _: f64| 1.0 / (x - 0.5).max(0.0))

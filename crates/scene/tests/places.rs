@@ -135,7 +135,10 @@ fn the_text_of_a_scene_with_a_mesh_file_runs_from_another_folder() {
     }
     // A text without a file of its own stays as it is.
     let scene = from_text(&text("'plate.msh'"), "scene.toml", folder.path(), &[]);
-    assert_eq!(scene.ok().expect("a scene").text, text("'plate.msh'"));
+    assert_eq!(
+        scene.unwrap_or_else(|e| panic!("{e}")).text,
+        text("'plate.msh'")
+    );
 }
 
 #[test]
