@@ -181,15 +181,24 @@ fn a_load_that_the_mesh_does_not_see_is_no_goal() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scene = folder.path().join("waves.toml");
     // The load has mean zero over every initial triangle and against every initial hat function.
-    fs::write(
-        &scene,
-        "[domain.rectangle]\nlower = [0, 0]\nupper = [2, 2]\nsize = 0.5\n[upper]\nload = \"1000*sin(8*pi*x)*sin(8*pi*y)\"\nboundary = 100\n\
-         [stop]\nrelative_error = 0.1\nlevels = 3\n",
-    )
-    .expect("written");
-    let run = run(&scene, &[]);
-    assert_eq!(run.code, 5, "{}", run.stdout);
-    assert_eq!(run.summary()["levels"], 3);
+    for (height, goal) in [
+        ("100", "relative_error = 0.1"),
+        ("x + 1", "relative_error = 0.1"),
+        ("x + 1", "error = 1.0"),
+    ] {
+        fs::write(
+            &scene,
+            format!(
+                "[domain.rectangle]\nlower = [0, 0]\nupper = [2, 2]\nsize = 0.5\n\
+                 [upper]\nload = \"1000*sin(8*pi*x)*sin(8*pi*y)\"\nboundary = \"{height}\"\n\
+                 [stop]\n{goal}\nlevels = 3\n"
+            ),
+        )
+        .expect("written");
+        let run = run(&scene, &[]);
+        assert_eq!(run.code, 5, "{height}, {goal}: {}", run.stdout);
+        assert_eq!(run.summary()["levels"], 3);
+    }
 }
 
 #[test]

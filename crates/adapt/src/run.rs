@@ -159,10 +159,14 @@ fn reached(stop: &Stop, settings: &Settings, level: &Level, scale: Scale) -> Opt
     let floor = ROUNDING_SHARE * estimates.largest_contribution;
     // Compared in the unit of the bound, so that neither side leaves the range of double precision.
     let norm = times_power_of_two(estimates.energy.energy_norm, scale.energy_norm() - unit);
+    // A load that the mesh does not resolve is no part of the bound, so it must meet the goal by itself.
+    let within = |limit: f64| estimates.bound <= limit && estimates.unseen <= limit;
     let relative = stop
         .relative_error
-        .is_some_and(|goal| estimates.bound <= goal * norm + floor);
-    let absolute = stop.error.is_some_and(|goal| record.error_bound <= goal);
+        .is_some_and(|goal| within(goal * norm + floor));
+    let absolute = stop
+        .error
+        .is_some_and(|goal| within(times_power_of_two(goal, -unit)));
     let rules = [
         (relative, Reason::RelativeError),
         (absolute, Reason::Error),
