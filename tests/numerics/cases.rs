@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use adapt::settings::{Estimate, Estimator, Stop, Strategy};
-use adapt::{Level, Observer, Outcome, Problem, Reason, Settings};
+use adapt::{Level, Problem, Reason, Settings};
 use fem_core::scale::times_power_of_two;
 use fem_core::{Children, Circle, Mesh};
 
@@ -159,38 +159,16 @@ pub fn uniform(levels: usize) -> Settings {
 
 /// Runs and keeps every level.
 pub fn levels(problem: &Problem, settings: &Settings) -> Vec<Level> {
-    struct Keep(Vec<Level>);
-    impl Observer for Keep {
-        fn level(
-            &mut self,
-            level: &Level,
-            _: Option<Reason>,
-        ) -> Result<(), adapt::output::OutputError> {
-            self.0.push(level.clone());
-            Ok(())
-        }
-    }
-    let mut keep = Keep(Vec::new());
+    let mut kept = Vec::new();
+    let mut keep = |level: &Level, _: Option<Reason>| {
+        kept.push(level.clone());
+        Ok(())
+    };
     adapt::run(problem, settings, &mut keep).unwrap_or_else(|e| panic!("{e}"));
-    keep.0
-}
-
-/// Runs without looking at the levels between.
-pub fn last(problem: &Problem, settings: &Settings) -> Outcome {
-    struct Blind;
-    impl Observer for Blind {
-        fn level(
-            &mut self,
-            _: &Level,
-            _: Option<Reason>,
-        ) -> Result<(), adapt::output::OutputError> {
-            Ok(())
-        }
-    }
-    adapt::run(problem, settings, &mut Blind).unwrap_or_else(|e| panic!("{e}"))
+    kept
 }
 
 /// Solves and estimates on the problem's own mesh.
 pub fn solve(problem: &Problem) -> Level {
-    last(problem, &uniform(1)).level
+    levels(problem, &uniform(1)).remove(0)
 }

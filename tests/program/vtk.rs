@@ -9,8 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use adapt::output::OutputError;
-use adapt::{Level, Observer, Reason};
+use adapt::{Level, Reason};
 use serde_json::Value;
 
 use crate::run::{config, run};
@@ -107,17 +106,14 @@ fn readback(python: &Path, arguments: &[&str]) -> Vec<String> {
 
 /// The same scene run in this process.
 fn levels(path: &Path) -> (scene::Scene, Vec<Level>) {
-    struct Keep(Vec<Level>);
-    impl Observer for Keep {
-        fn level(&mut self, level: &Level, _: Option<Reason>) -> Result<(), OutputError> {
-            self.0.push(level.clone());
-            Ok(())
-        }
-    }
     let scene = scene::load(path, &[]).unwrap_or_else(|e| panic!("{e}"));
-    let mut keep = Keep(Vec::new());
+    let mut kept = Vec::new();
+    let mut keep = |level: &Level, _: Option<Reason>| {
+        kept.push(level.clone());
+        Ok(())
+    };
     adapt::run(&scene.problem, &scene.settings, &mut keep).unwrap_or_else(|e| panic!("{e}"));
-    (scene, keep.0)
+    (scene, kept)
 }
 
 /// Every value of an array against the bits that VTK read.

@@ -73,6 +73,16 @@ pub trait Observer {
     }
 }
 
+/// A closure that is shown every level watches a run too.
+impl<F> Observer for F
+where
+    F: FnMut(&Level, Option<Reason>) -> Result<(), OutputError>,
+{
+    fn level(&mut self, level: &Level, last: Option<Reason>) -> Result<(), OutputError> {
+        self(level, last)
+    }
+}
+
 /// Why a run ended: the rule of the scene that held.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Reason {

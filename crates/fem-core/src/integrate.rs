@@ -322,6 +322,12 @@ pub fn smooth_error(misfit: f64, largest: f64) -> f64 {
     }
 }
 
+/// The largest sample, and the quadrature error of their mean that their misfit points to.
+fn size_and_error(rule: &[RulePoint; POINTS], samples: &[f64]) -> (f64, f64) {
+    let largest = samples.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    (largest, smooth_error(affine_misfit(rule, samples), largest))
+}
+
 /// Integrates a load against the hat functions: nodal loads, element means and deviations from them.
 ///
 /// # Errors
@@ -381,8 +387,7 @@ impl Integrand for LoadMoments<'_> {
 
     fn judge(&self, piece: &Piece<'_>) -> Judgement {
         let f = piece.values(0);
-        let largest = f.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let error = smooth_error(affine_misfit(piece.rule, f), largest);
+        let (_, error) = size_and_error(piece.rule, f);
         let magnitude: f64 = piece
             .rule
             .iter()
@@ -465,11 +470,11 @@ impl Integrand for FieldMeans<'_> {
 
     fn judge(&self, piece: &Piece<'_>) -> Judgement {
         let f = piece.values(0);
-        let largest = f.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let (largest, error) = size_and_error(piece.rule, f);
         let share = piece.area / self.area[piece.triangle];
         Judgement {
             magnitude: largest * share,
-            error: share * smooth_error(affine_misfit(piece.rule, f), largest),
+            error: share * error,
         }
     }
 
