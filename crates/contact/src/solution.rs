@@ -68,14 +68,19 @@ impl Solution {
     }
 }
 
-/// The relative KKT residual of an iterate: the largest, over interior vertices j, of `|F_ij +- z_j - (A_i u_i)_j| / (d_ij U)` and
-/// `|min(w_j, z_j/d_j)| / U`, U the largest displacement (1 if all are zero).
-pub fn kkt_residual(problem: &DiscreteProblem, displacement: &[Vec<f64>; 2], force: &[f64]) -> f64 {
+/// U: the largest displacement over all vertices, 1 if all are zero.
+fn displacement_unit(displacement: &[Vec<f64>; 2]) -> f64 {
     let largest = displacement
         .iter()
         .flatten()
         .fold(0.0f64, |m, u| m.max(u.abs()));
-    let unit = if largest == 0.0 { 1.0 } else { largest };
+    if largest == 0.0 { 1.0 } else { largest }
+}
+
+/// The relative KKT residual of an iterate: the largest, over interior vertices j, of `|F_ij +- z_j - (A_i u_i)_j| / (d_ij U)` and
+/// `|min(w_j, z_j/d_j)| / U`, U the largest displacement (1 if all are zero).
+pub fn kkt_residual(problem: &DiscreteProblem, displacement: &[Vec<f64>; 2], force: &[f64]) -> f64 {
+    let unit = displacement_unit(displacement);
     let mut worst = 0.0f64;
     for j in (0..problem.order()).filter(|&j| !problem.boundary[j]) {
         for (i, sign) in [(0, 1.0), (1, -1.0)] {
@@ -108,11 +113,7 @@ pub fn rounding_residual(
     displacement: &[Vec<f64>; 2],
     force: &[f64],
 ) -> f64 {
-    let largest = displacement
-        .iter()
-        .flatten()
-        .fold(0.0f64, |m, u| m.max(u.abs()));
-    let unit = if largest == 0.0 { 1.0 } else { largest };
+    let unit = displacement_unit(displacement);
     let mut worst = 0.0f64;
     for j in (0..problem.order()).filter(|&j| !problem.boundary[j]) {
         for i in 0..2 {

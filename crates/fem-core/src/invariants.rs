@@ -8,7 +8,7 @@ use crate::topology::Neighbour;
 /// Areas are positive; neighbours name each other and run along the common edge in opposite directions; a boundary vertex is one with a boundary
 /// edge; every vertex is used; parents are older than their child, and lie on the boundary together with it
 /// (its edge was a boundary edge) exactly when there is no second opposite vertex; a straight child is the midpoint of its parents;
-/// levels exceed those of the vertices around; generations of neighbours differ by a bounded amount only through the edges they share.
+/// the level of a child is one more than the highest of the vertices around it.
 ///
 /// # Errors
 /// A sentence that says what is broken and where.

@@ -31,9 +31,9 @@ pub fn rule() -> [RulePoint; POINTS] {
     [centre, near[0], near[1], near[2], far[0], far[1], far[2]]
 }
 
-/// Where the rule is applied: values at its points, one slice.
+/// How far values at the points of the rule are from those of an affine function.
 ///
-/// Returns the largest deviation of the values from the affine function that fits them best in the mean (least squares with
+/// Returns the largest deviation from the affine function that fits them best in the mean (least squares with
 /// the weights of the rule): zero to rounding for affine data, O(h^2) for smooth data, of the order of the jump where data jump.
 pub fn affine_misfit(rule: &[RulePoint; POINTS], values: &[f64]) -> f64 {
     // The first value is taken out so that constant data fit exactly.

@@ -63,8 +63,7 @@ pub fn from_text(
     };
     let report = |fault| sources.report(fault);
     let sets = overrides::parse(overrides).map_err(report)?;
-    let tree = tree::read(&sources, &sets).map_err(report)?;
-    let file = parse::scene(&tree).map_err(report)?;
+    let file = decode(&sources, &sets)?;
     let checked = validate::check(&file, &sources).map_err(report)?;
     let as_run = overrides::apply(text, &sets);
     build::scene(checked, &sources, folder, as_run)
@@ -80,10 +79,14 @@ pub fn parse_text(text: &str, name: &str, overrides: &[String]) -> Result<SceneF
         text,
         overrides,
     };
-    let report = |fault| sources.report(fault);
-    let sets = overrides::parse(overrides).map_err(report)?;
-    let tree = tree::read(&sources, &sets).map_err(report)?;
-    parse::scene(&tree).map_err(report)
+    let sets = overrides::parse(overrides).map_err(|fault| sources.report(fault))?;
+    decode(&sources, &sets)
+}
+
+/// From text and overrides to what was written.
+fn decode(sources: &Sources<'_>, sets: &[overrides::Override]) -> Result<SceneFile, SceneError> {
+    let tree = tree::read(sources, sets).map_err(|fault| sources.report(fault))?;
+    parse::scene(&tree).map_err(|fault| sources.report(fault))
 }
 
 fn read_text(path: &Path, name: &str) -> Result<String, SceneError> {
