@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use contact::DiscreteProblem;
-use fem_core::integrate::{loads, means};
+use fem_core::integrate::{load_pair, means};
 use fem_core::{Field, FieldError, Mesh, Samples};
 
 use crate::problem::Problem;
@@ -69,10 +69,7 @@ pub fn discretise(problem: &Problem, mesh: &Mesh) -> Result<DiscreteProblem, Dat
         let excess = fem_core::scale::times_power_of_two(excess, problem.scale.displacement());
         return Err(DataError::Heights { x, y, excess });
     }
-    let loads = [
-        loads(mesh, &*problem.load[0])?,
-        loads(mesh, &*problem.load[1])?,
-    ];
+    let loads = load_pair(mesh, [&*problem.load[0], &*problem.load[1]])?;
     Ok(DiscreteProblem::new(mesh, tension, loads, heights))
 }
 
