@@ -2,6 +2,7 @@
 
 mod agreement;
 mod cases;
+mod certificate;
 mod covariance;
 mod efficiency;
 mod rates;

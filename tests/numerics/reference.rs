@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::cases::{case, solve, tests};
 
-const NAMES: [&str; 11] = [
+pub const NAMES: [&str; 11] = [
     "P1_disk_8_4",
     "P2_right_16",
     "P3_lshape_16",
@@ -26,13 +26,14 @@ const NAMES: [&str; 11] = [
     "P8_delaunay_24",
 ];
 
-struct Reference {
-    problem: adapt::Problem,
-    values: Value,
+/// A mesh with its values.
+pub struct Reference {
+    pub problem: adapt::Problem,
+    pub values: Value,
 }
 
 impl Reference {
-    fn read(name: &str) -> Reference {
+    pub fn read(name: &str) -> Reference {
         let folder = tests().join("reference");
         let text = std::fs::read_to_string(folder.join(format!("{name}.json"))).expect("values");
         let values: Value = serde_json::from_str(&text).expect("JSON");

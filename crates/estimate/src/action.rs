@@ -18,29 +18,31 @@ pub fn nodal_action(mesh: &Mesh, problem: &DiscreteProblem, solution: &Solution)
         .zip(&problem.dual_area)
         .map(|(z, area)| z / area)
         .collect();
-    extend_to_boundary(problem, solution, &mut action);
+    extend_to_boundary(mesh, |j| solution.gap(j), &mut action);
     action
 }
 
 /// Overwrites the entries of boundary vertices by the rule of the [module](self).
 ///
-/// `values` has one entry a vertex. Vertices that no interior vertex can be reached from along boundary vertices get 0.
-pub fn extend_to_boundary(problem: &DiscreteProblem, solution: &Solution, values: &mut [f64]) {
-    let neighbours = |j: usize| problem.pattern.columns(j).iter().map(|&k| k as usize);
+/// `values` has one entry a vertex; `gap` tells u1 - u2 at a vertex. Vertices that no interior vertex can be reached from along boundary
+/// vertices get 0.
+pub fn extend_to_boundary(mesh: &Mesh, gap: impl Fn(usize) -> f64, values: &mut [f64]) {
+    let around = Around::of(mesh);
     let mean = |j: usize, done: &[bool], values: &[f64]| {
         let (mut sum, mut count) = (0.0, 0usize);
-        for k in neighbours(j).filter(|&k| done[k]) {
-            sum += values[k];
+        for &k in around.neighbours(j).iter().filter(|&&k| done[k as usize]) {
+            sum += values[k as usize];
             count += 1;
         }
         (count > 0).then(|| sum / count as f64)
     };
-    let interior: Vec<bool> = problem.boundary.iter().map(|&b| !b).collect();
+    let interior: Vec<bool> = mesh.boundary().iter().map(|&b| !b).collect();
     let mut done = interior.clone();
     let mut front = Vec::new();
-    for j in (0..values.len()).filter(|&j| problem.boundary[j]) {
+    for &j in &around.vertices {
+        let j = j as usize;
         values[j] = 0.0;
-        let value = if solution.gap(j) > 0.0 {
+        let value = if gap(j) > 0.0 {
             Some(0.0)
         } else {
             mean(j, &interior, values)
@@ -55,7 +57,8 @@ pub fn extend_to_boundary(problem: &DiscreteProblem, solution: &Solution, values
     while !front.is_empty() {
         let mut next: Vec<usize> = front
             .iter()
-            .flat_map(|&j| neighbours(j))
+            .flat_map(|&j| around.neighbours(j))
+            .map(|&k| k as usize)
             .filter(|&k| !done[k])
             .collect();
         next.sort_unstable();
@@ -66,6 +69,53 @@ pub fn extend_to_boundary(problem: &DiscreteProblem, solution: &Solution, values
             done[j] = true;
         }
         front = next;
+    }
+}
+
+/// The vertices that share an edge with each boundary vertex.
+struct Around {
+    /// The boundary vertices, increasing.
+    vertices: Vec<u32>,
+    /// Their neighbours one after the other.
+    other: Vec<u32>,
+    /// Where those of each begin, and the end.
+    start: Vec<u32>,
+}
+
+impl Around {
+    /// O(N) but for the sorting of what touches the boundary.
+    fn of(mesh: &Mesh) -> Around {
+        let boundary = mesh.boundary();
+        let vertices: Vec<u32> = (0..boundary.len() as u32)
+            .filter(|&j| boundary[j as usize])
+            .collect();
+        let mut pairs = Vec::new();
+        for v in mesh.triangles() {
+            for j in v.iter().filter(|j| boundary[j.index()]) {
+                pairs.extend(v.iter().filter(|k| *k != j).map(|k| (j.0, k.0)));
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        let other = pairs.iter().map(|p| p.1).collect();
+        let mut start: Vec<u32> = vertices
+            .iter()
+            .map(|&j| pairs.partition_point(|p| p.0 < j) as u32)
+            .collect();
+        start.push(pairs.len() as u32);
+        Around {
+            vertices,
+            other,
+            start,
+        }
+    }
+
+    /// Of a boundary vertex, increasing; of an interior one nothing.
+    fn neighbours(&self, j: usize) -> &[u32] {
+        match self.vertices.binary_search(&(j as u32)) {
+            Ok(at) => &self.other[self.start[at] as usize..self.start[at + 1] as usize],
+            Err(_) => &[],
+        }
     }
 }
 
@@ -106,7 +156,7 @@ mod tests {
         let mut values = vec![7.0, 7.0, 7.0, 7.0, 1.5, 7.0];
         let upper = vec![0.0, 0.5, 0.0, 0.0, 0.0, 0.0];
         let solution = solution([upper, vec![0.0; 6]], vec![0.0; 6], vec![0.0; 6]);
-        extend_to_boundary(&problem, &solution, &mut values);
+        extend_to_boundary(&mesh, |j| solution.gap(j), &mut values);
         assert_eq!(values, [1.5, 0.0, 1.5, 1.5, 1.5, 0.75]);
     }
 

@@ -4,6 +4,7 @@
 //!
 //! - [`mod@paper`]: the indicators eta_K (7.1) and eta_e (7.2) of the paper;
 //! - [`mod@residual`]: a residual estimator that is robust in the tensions;
+//! - [`certificate`]: a guaranteed bound of the energy error;
 //! - [`mod@oscillation`]: what first-order elements do not see of the loads;
 //! - [`action`]: the action as a function, with values at boundary vertices;
 //! - [`mod@energy`]: J(u_h) and the energy norm of u_h;
@@ -14,6 +15,7 @@
 //! and hold roots: the total is the root of the sum of their squares, [`root_sum`].
 
 pub mod action;
+pub mod certificate;
 pub mod efficiency;
 pub mod energy;
 pub mod errors;
@@ -24,6 +26,7 @@ pub mod paper;
 pub mod residual;
 
 pub use action::{extend_to_boundary, nodal_action};
+pub use certificate::{Certificate, Given, Grade, certify};
 pub use efficiency::{Efficiency, efficiency};
 pub use energy::{Energy, energy};
 pub use errors::{TrueErrors, true_errors};

@@ -31,11 +31,17 @@ pub fn rule() -> [RulePoint; POINTS] {
     [centre, near[0], near[1], near[2], far[0], far[1], far[2]]
 }
 
-/// How far values at the points of the rule are from those of an affine function.
-///
-/// Returns the largest deviation from the affine function that fits them best in the mean (least squares with
-/// the weights of the rule): zero to rounding for affine data, O(h^2) for smooth data, of the order of the jump where data jump.
-pub fn affine_misfit(rule: &[RulePoint; POINTS], values: &[f64]) -> f64 {
+/// The affine function that fits samples at the points of the rule best.
+#[derive(Clone, Copy, Debug)]
+pub struct AffineFit {
+    /// Its values at the three corners.
+    pub corners: [f64; 3],
+    /// The largest deviation of a sample from it.
+    pub misfit: f64,
+}
+
+/// Fits samples in the mean (least squares with the weights of the rule).
+pub fn affine_fit(rule: &[RulePoint; POINTS], values: &[f64]) -> AffineFit {
     // The first value is taken out so that constant data fit exactly.
     let base = values[0];
     let (mut mean, mut slope) = (0.0, [0.0; 3]);
@@ -47,12 +53,23 @@ pub fn affine_misfit(rule: &[RulePoint; POINTS], values: &[f64]) -> f64 {
         }
     }
     // (lambda_k - 1/3) have mean zero, norm^2 1/18 and products -1/36: the fit is mean + 12 * sum slope_k lambda_k.
-    let mut worst = 0.0f64;
+    let mut misfit = 0.0f64;
     for (p, v) in rule.iter().zip(values) {
         let fit = mean + 12.0 * (slope[0] * p.at[0] + slope[1] * p.at[1] + slope[2] * p.at[2]);
-        worst = worst.max((v - base - fit).abs());
+        misfit = misfit.max((v - base - fit).abs());
     }
-    worst
+    AffineFit {
+        corners: slope.map(|s| base + mean + 12.0 * s),
+        misfit,
+    }
+}
+
+/// How far values at the points of the rule are from those of an affine function.
+///
+/// Returns the largest deviation from the affine function that fits them best: zero to rounding for affine data, O(h^2) for smooth data, of the
+/// order of the jump where data jump.
+pub fn affine_misfit(rule: &[RulePoint; POINTS], values: &[f64]) -> f64 {
+    affine_fit(rule, values).misfit
 }
 
 #[cfg(test)]

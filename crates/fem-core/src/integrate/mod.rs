@@ -40,6 +40,11 @@ pub trait Integrand {
         Partition::Whole
     }
 
+    /// Whether nothing is to be sampled in an element.
+    fn skips(&self, _triangle: usize) -> bool {
+        false
+    }
+
     /// Forgets what was added for a triangle.
     fn clear(&mut self, triangle: usize);
 
@@ -183,7 +188,7 @@ pub fn integrate(
     let block = BLOCK / partition.count();
     for first in (0..count).step_by(block) {
         parts.clear();
-        for t in first..count.min(first + block) {
+        for t in (first..count.min(first + block)).filter(|&t| !integrand.skips(t)) {
             partition.parts(t as u32, &mut parts);
         }
         sampler.run(

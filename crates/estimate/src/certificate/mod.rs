@@ -1,0 +1,173 @@
+//! The certificate: a bound of the energy error without unknown constants.
+//!
+//! For u_h with u_1h >= u_2h, any action lambda_h >= 0 in L2 and fluxes s_i in H(div), with e = u - u_h and C = (lambda_h, u_1h - u_2h):
+//!
+//! ```text
+//! |||e||| <= eta/2 + (eta^2/4 + C)^(1/2)                                                                         (B1)
+//! eta^2 = sum_i sum_K ( ||mu_i^(-1/2)(s_i + mu_i grad u_ih)||_K + C_K mu_{i,K,min}^(-1/2) ||f_i +- lambda_h - r_i - div s_i||_K )^2
+//! eta replaced by eta + eta_alg,   eta_alg = (d/pi) (sum_i mu_{i,min}^(-1) sum_j rho_ij^2/|D_j|)^(1/2)
+//! ```
+//!
+//! where the divergence of s_i has the element means of f_i +- lambda_h - r_i, rho_ij = F_ij +- z_j - (A_i u_ih)_j are the residuals of the rows, r_i = sum_j
+//! rho_ij chi_Dj/|D_j|, d is the width of the domain, and C_K = h_K/3.8317 the sharp constant of Poincare's inequality
+//! on triangles (j_11, the first zero of the Bessel function J_1; Laugesen, Siudeja 2010). Nothing is assumed of the solver.
+//!
+//! The steps: moments of the data, shares of the forces (`shares`), fluxes of one of two grades (`rt0`, `rt1`), norms.
+
+mod fan;
+mod misfit;
+mod moments;
+mod ring;
+mod rt0;
+mod rt1;
+mod shares;
+
+use fem_core::{Field, FieldError, Mesh};
+
+use crate::gradients::gradients;
+use misfit::{Norms, norms};
+pub use moments::JUMP;
+use moments::{Moments, product};
+use shares::Shares;
+
+/// How the fluxes are reconstructed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Grade {
+    /// RT0 on the six triangles between the medians of every element; no linear systems.
+    Rt0,
+    /// RT1, one small system for every vertex.
+    Rt1,
+}
+
+/// C_K = h_K divided by this: 3.8317, rounded down, the first positive zero of the Bessel function J_1.
+pub const POINCARE: f64 = 3.831_705_970_207_512;
+
+/// What a certificate is made from, in scaled units.
+#[derive(Clone, Copy)]
+pub struct Given<'a> {
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// Loads f_1, f_2.
+    pub load: [&'a dyn Field; 2],
+    /// Tensions mu_1, mu_2.
+    pub tension: [&'a dyn Field; 2],
+    /// Their means over the elements.
+    pub tension_mean: &'a [Vec<f64>; 2],
+    /// Displacements with u_1h >= u_2h at every vertex.
+    pub displacement: &'a [Vec<f64>; 2],
+    /// Action forces; what is negative counts as 0.
+    pub force: &'a [f64],
+}
+
+impl Given<'_> {
+    /// u_1h - u_2h at a vertex.
+    fn gap(&self, j: usize) -> f64 {
+        self.displacement[0][j] - self.displacement[1][j]
+    }
+}
+
+/// A guaranteed bound and where it comes from.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Certificate {
+    /// Which fluxes.
+    pub grade: Grade,
+    /// (eta_K^2 + C on K)^(1/2), one entry a triangle: roots, in the unit of the energy norm.
+    pub local: Vec<f64>,
+    /// eta, in the unit of the energy norm.
+    pub eta: f64,
+    /// C = (lambda_h, u_1h - u_2h), an energy.
+    pub contact: f64,
+    /// eta_alg, in the unit of the energy norm.
+    pub algebraic: f64,
+    /// (B1), in the unit of the energy norm.
+    pub bound: f64,
+    /// Number of triangles in which samples of a tension differ by more than a factor [`JUMP`].
+    pub jumps: usize,
+}
+
+/// Certifies a discrete solution, or any other pair that does not penetrate; O(N).
+///
+/// `poincare` divides h_K in C_K, [`POINCARE`] or pi.
+///
+/// # Errors
+/// A value of a load or a tension that is not finite.
+pub fn certify(given: &Given<'_>, grade: Grade, poincare: f64) -> Result<Certificate, FieldError> {
+    let mesh = given.mesh;
+    let moments = Moments::of(mesh, given.load, given.tension, given.tension_mean)?;
+    let flux = [0, 1].map(|i| {
+        let mut flux = gradients(mesh, &given.displacement[i]);
+        for (q, mu) in flux.iter_mut().zip(&given.tension_mean[i]) {
+            *q = [mu * q[0], mu * q[1]];
+        }
+        flux
+    });
+    let shares = Shares::of(given, &moments, &flux);
+    let norms = match grade {
+        Grade::Rt0 => {
+            let (fluxes, squares) = rt0::equilibrate(mesh, &moments, &shares, &flux);
+            norms(given, &moments, &shares, &flux, &squares, &fluxes)?
+        }
+        Grade::Rt1 => {
+            let (fluxes, squares) = rt1::equilibrate(mesh, &moments, &shares, &flux);
+            norms(given, &moments, &shares, &flux, &squares, &fluxes)?
+        }
+    };
+    let mut local = Vec::with_capacity(mesh.triangle_count());
+    let (mut square, mut contact) = (0.0, 0.0);
+    for (t, id) in mesh.triangle_ids().enumerate() {
+        let shape = mesh.shape(id);
+        let constant = shape.diameter() / poincare;
+        let Norms { misfit, remainder } = norms[t];
+        let mut own = 0.0;
+        for i in 0..2 {
+            let low = moments.stiffness_low[i][t];
+            own += (misfit[i].sqrt() + constant * (remainder[i] / low).sqrt()).powi(2);
+        }
+        let overlap = contact_term(given, &moments, &shares, t, shape.area);
+        square += own;
+        contact += overlap;
+        local.push((own + overlap).sqrt());
+    }
+    let low = [0, 1].map(|i| {
+        moments.stiffness_low[i]
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min)
+    });
+    let eta = square.sqrt();
+    let algebraic = shares.algebraic(mesh, low);
+    let half = 0.5 * (eta + algebraic);
+    Ok(Certificate {
+        grade,
+        local,
+        eta,
+        contact,
+        algebraic,
+        bound: half + (half * half + contact).sqrt(),
+        jumps: moments.jumps,
+    })
+}
+
+/// int_K lambda_h (u_1h - u_2h): (lambda* theta, w) from the moments, and 11|K|/54, 7|K|/108 for the hat functions on a dual cell.
+fn contact_term(given: &Given<'_>, moments: &Moments, shares: &Shares, t: usize, area: f64) -> f64 {
+    let v = given.mesh.triangles()[t].map(|j| j.index());
+    let gap = v.map(|j| given.gap(j));
+    if gap == [0.0; 3] {
+        return 0.0;
+    }
+    let all: f64 = gap.iter().sum();
+    let mut sum = 0.0;
+    for k in 0..3 {
+        let (theta, kappa) = (shares.theta[v[k]], shares.kappa[v[k]]);
+        if theta > 0.0 {
+            let part: f64 = (0..3)
+                .map(|l| moments.action[t][product(k, l)] * gap[l])
+                .sum();
+            sum += theta * part;
+        }
+        if kappa > 0.0 {
+            sum += kappa * area / 108.0 * (22.0 * gap[k] + 7.0 * (all - gap[k]));
+        }
+    }
+    sum.max(0.0)
+}
