@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use adapt::settings::{Estimate, Estimator, Stop, Strategy};
+use adapt::settings::{Estimate, Estimator, Final, Stop, Strategy};
 use adapt::{Level, Problem, Reason, Settings};
 use fem_core::scale::times_power_of_two;
 use fem_core::{Children, Circle, Mesh};
@@ -146,6 +146,7 @@ pub fn uniform(levels: usize) -> Settings {
         estimate: Estimate {
             estimator: Estimator::Residual,
             also: vec![Estimator::Paper],
+            last: Final::Fast,
         },
         ..Settings::default()
     };

@@ -1,7 +1,7 @@
 //! Rates of convergence: first order in h on uniform meshes, N^(-1/2) with adaptivity where a corner spoils it.
 
 use adapt::Settings;
-use adapt::settings::{Estimate, Estimator, Stop, Strategy};
+use adapt::settings::{Estimate, Estimator, Final, Stop, Strategy};
 
 use crate::cases::{Grid, configs, levels, on, uniform};
 
@@ -106,6 +106,7 @@ fn adaptivity_restores_the_rate_at_a_corner() {
         settings.estimate = Estimate {
             estimator,
             also: vec![],
+            last: Final::Fast,
         };
         settings.stop = Stop {
             vertices: Some(40_000),

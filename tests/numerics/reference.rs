@@ -50,6 +50,26 @@ impl Reference {
         self.values["totals"][key].as_f64()
     }
 
+    /// The discrete problem with the loads of the file.
+    pub fn discrete(&self) -> DiscreteProblem {
+        let (problem, scale) = (&self.problem, self.problem.scale);
+        let mut discrete = discretise(problem, &problem.mesh).expect("good data");
+        for (i, k) in [(0, "1"), (1, "2")] {
+            let scaled = |key: String, e: i32| -> Vec<f64> {
+                self.array(&key)
+                    .iter()
+                    .map(|&v| times_power_of_two(v, -e))
+                    .collect()
+            };
+            discrete.loads[i] = Loads {
+                nodal: scaled(format!("load{k}"), scale.force()),
+                mean: scaled(format!("f{k}_mean"), scale.load),
+                deviation_squared: discrete.loads[i].deviation_squared.clone(),
+            };
+        }
+        discrete
+    }
+
     /// The file's eta_e in the order of a mesh's interior edges.
     fn edges(&self, mesh: &Mesh) -> Vec<f64> {
         let eta = self.array("eta_e");
@@ -136,22 +156,7 @@ fn differences(reference: &Reference, discrete: &DiscreteProblem, solution: &Sol
 fn with_the_loads_of_the_file() {
     for name in NAMES {
         let reference = Reference::read(name);
-        let (problem, scale) = (&reference.problem, reference.problem.scale);
-        let mut discrete = discretise(problem, &problem.mesh).expect("good data");
-        for (i, k) in [(0, "1"), (1, "2")] {
-            let scaled = |key: String, e: i32| -> Vec<f64> {
-                reference
-                    .array(&key)
-                    .iter()
-                    .map(|&v| times_power_of_two(v, -e))
-                    .collect()
-            };
-            discrete.loads[i] = Loads {
-                nodal: scaled(format!("load{k}"), scale.force()),
-                mean: scaled(format!("f{k}_mean"), scale.load),
-                deviation_squared: discrete.loads[i].deviation_squared.clone(),
-            };
-        }
+        let discrete = reference.discrete();
         for reduce in [true, false] {
             let settings = contact::Settings {
                 reduce,

@@ -3,10 +3,12 @@
 use std::time::Instant;
 
 use contact::{DiscreteProblem, Solution, Start};
-use estimate::{Energy, Paper, TrueErrors, root_sum};
+use estimate::certificate::POINCARE;
+use estimate::{Certificate, Energy, Given, Grade, Paper, TrueErrors, certify, root_sum};
 use fem_core::scale::times_power_of_two;
-use fem_core::{Mesh, Scale, TriangleId};
+use fem_core::{FieldError, Mesh, Scale, TriangleId};
 
+use crate::assurance::Assurance;
 use crate::discretise::discretise;
 use crate::output::memory::peak_memory_mb;
 use crate::problem::Problem;
@@ -38,6 +40,8 @@ pub struct Estimates {
     pub paper: Option<Paper>,
     /// Residual estimator, if wanted.
     pub residual: Option<Vec<f64>>,
+    /// The certificate, if wanted.
+    pub certificate: Option<Certificate>,
     /// Data oscillation.
     pub oscillation: Vec<f64>,
     /// Errors against the exact solution, if known.
@@ -49,7 +53,7 @@ pub struct Estimates {
     /// J(u_h) and |||u_h|||.
     pub energy: Energy,
     /// What the estimator does not see of the loads, in the unit of the bound: their oscillation, over the root of the tension where
-    /// the energy norm is estimated.
+    /// the energy norm is estimated. The certificate sees everything.
     pub unseen: f64,
     /// The number that the run is judged by.
     pub bound: f64,
@@ -99,6 +103,50 @@ impl Level {
         Level::on(mesh, problem, settings, Some(carried), steps)
     }
 
+    /// Replaces the certificate of this level by the sharp one, and the bound with it where the certificate drives the run.
+    ///
+    /// Returns the quotient of the sharp bound and the one before; 1 where both vanish.
+    pub(crate) fn sharpen(
+        &mut self,
+        problem: &Problem,
+        settings: &Settings,
+        begun: Instant,
+    ) -> Result<f64, LevelError> {
+        let clock = Instant::now();
+        let sharp = certified(
+            &self.mesh,
+            &self.discrete,
+            &self.solution,
+            problem,
+            Grade::Rt1,
+        )?;
+        let estimates = &mut self.estimates;
+        let before = estimates.certificate.as_ref().map_or(0.0, |c| c.bound);
+        let ratio = if before > 0.0 {
+            sharp.bound / before
+        } else {
+            1.0
+        };
+        if settings.estimate.estimator == Estimator::Certified {
+            estimates.bound = sharp.bound;
+        }
+        estimates.certificate = Some(sharp);
+        let (mesh, discrete, solution) = (&self.mesh, &self.discrete, &self.solution);
+        let new = record(mesh, discrete, solution, estimates, problem, settings)?;
+        let old = &mut self.record;
+        old.certified = new.certified;
+        old.eta_alg = new.eta_alg;
+        old.assurance = new.assurance;
+        old.error_bound = new.error_bound;
+        old.bound_kind = new.bound_kind;
+        old.relative_bound = new.relative_bound;
+        old.effectivity = new.effectivity;
+        old.seconds_estimate += clock.elapsed().as_secs_f64();
+        old.seconds_total = begun.elapsed().as_secs_f64();
+        old.peak_memory_mb = peak_memory_mb();
+        Ok(ratio)
+    }
+
     fn on(
         mesh: Mesh,
         problem: &Problem,
@@ -114,14 +162,7 @@ impl Level {
         let solve = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let estimates = Estimates::of(&mesh, &discrete, &solution, problem, settings)?;
-        let mut record = record(
-            &mesh,
-            &discrete,
-            &solution,
-            &estimates,
-            settings,
-            problem.scale,
-        );
+        let mut record = record(&mesh, &discrete, &solution, &estimates, problem, settings)?;
         record.level = steps.number;
         record.seconds_refine = steps.refine;
         record.seconds_assemble = assemble;
@@ -170,10 +211,17 @@ impl Estimates {
             )?),
             None => None,
         };
-        let weighted = settings.estimate.estimator == Estimator::Residual;
-        // The driving estimator was asked for, so it is there.
+        let certificate = match wants(Estimator::Certified) {
+            true => Some(certified(mesh, discrete, solution, problem, Grade::Rt0)?),
+            false => None,
+        };
+        let weighted = settings.estimate.estimator != Estimator::Paper;
+        let seen = settings.estimate.estimator == Estimator::Certified;
         let unseen: Vec<f64> = (0..mesh.triangle_count())
             .map(|t| {
+                if seen {
+                    return 0.0;
+                }
                 let h = mesh.shape(TriangleId(t as u32)).diameter();
                 let part = |i: usize| {
                     discrete.loads[i].deviation_squared[t]
@@ -182,9 +230,11 @@ impl Estimates {
                 h * h * (part(0) + part(1))
             })
             .collect();
-        let driving: &[f64] = match (settings.estimate.estimator, &paper, &residual) {
-            (Estimator::Paper, Some(paper), _) => &paper.eta_k,
-            (_, _, residual) => residual.as_deref().unwrap_or_default(),
+        // The driving estimator was asked for, so it is there.
+        let driving: &[f64] = match settings.estimate.estimator {
+            Estimator::Paper => paper.as_ref().map_or(&[], |p| &p.eta_k),
+            Estimator::Residual => residual.as_deref().unwrap_or_default(),
+            Estimator::Certified => certificate.as_ref().map_or(&[], |c| &c.local),
         };
         let marking: Vec<f64> = driving
             .iter()
@@ -195,6 +245,7 @@ impl Estimates {
         let bound = match settings.estimate.estimator {
             Estimator::Paper => marking.iter().sum::<f64>().sqrt(),
             Estimator::Residual => root_sum(driving),
+            Estimator::Certified => certificate.as_ref().map_or(0.0, |c| c.bound),
         };
         let mut largest = 0.0f64;
         for t in mesh.triangle_ids() {
@@ -209,6 +260,7 @@ impl Estimates {
         Ok(Estimates {
             paper,
             residual,
+            certificate,
             oscillation,
             errors,
             marking,
@@ -240,11 +292,21 @@ fn record(
     discrete: &DiscreteProblem,
     solution: &Solution,
     estimates: &Estimates,
+    problem: &Problem,
     settings: &Settings,
-    scale: Scale,
-) -> LevelRecord {
+) -> Result<LevelRecord, LevelError> {
+    let scale = problem.scale;
     let by = times_power_of_two;
-    let (bound_exponent, bound_kind) = bound_unit(settings.estimate.estimator, scale);
+    let bound_exponent = bound_unit(settings.estimate.estimator, scale);
+    let certificate = estimates.certificate.as_ref();
+    let bound_kind = match settings.estimate.estimator {
+        Estimator::Certified => match certificate.map(|c| c.grade) {
+            Some(Grade::Rt1) => "rt1",
+            _ => "rt0",
+        },
+        Estimator::Residual => "residual",
+        Estimator::Paper => "paper",
+    };
     let Energy {
         energy,
         energy_norm: norm,
@@ -261,7 +323,16 @@ fn record(
     let in_contact = || (0..mesh.vertex_count()).filter(|&j| solution.contact[j]);
     let pressures = (0..mesh.vertex_count()).map(|j| solution.force[j] / discrete.dual_area[j]);
     let errors = estimates.errors.as_ref();
-    LevelRecord {
+    let assurance = match certificate {
+        Some(certificate) => Some(Assurance::of(
+            mesh,
+            &discrete.tension_mean,
+            problem,
+            certificate,
+        )?),
+        None => None,
+    };
+    Ok(LevelRecord {
         level: 0,
         vertices: mesh.vertex_count(),
         triangles: mesh.triangle_count(),
@@ -313,13 +384,38 @@ fn record(
         seconds_estimate: 0.0,
         seconds_total: 0.0,
         peak_memory_mb: None,
+        certified: certificate.map(|c| by(c.bound, scale.energy_norm())),
+        eta_alg: certificate.map(|c| by(c.algebraic, scale.energy_norm())),
+        assurance,
+    })
+}
+
+/// Exponent of the unit of an estimator.
+pub(crate) fn bound_unit(estimator: Estimator, scale: Scale) -> i32 {
+    match estimator {
+        Estimator::Certified | Estimator::Residual => scale.energy_norm(),
+        Estimator::Paper => scale.force(),
     }
 }
 
-/// Exponent of the unit of an estimator, and its name in the history.
-pub(crate) fn bound_unit(estimator: Estimator, scale: Scale) -> (i32, &'static str) {
-    match estimator {
-        Estimator::Residual => (scale.energy_norm(), "residual"),
-        Estimator::Paper => (scale.force(), "paper"),
-    }
+/// The certificate of a solution of a problem.
+///
+/// # Errors
+/// A value of a load or a tension that is not finite.
+fn certified(
+    mesh: &Mesh,
+    discrete: &DiscreteProblem,
+    solution: &Solution,
+    problem: &Problem,
+    grade: Grade,
+) -> Result<Certificate, FieldError> {
+    let given = Given {
+        mesh,
+        load: [&*problem.load[0], &*problem.load[1]],
+        tension: [&*problem.tension[0], &*problem.tension[1]],
+        tension_mean: &discrete.tension_mean,
+        displacement: &solution.displacement,
+        force: &solution.force,
+    };
+    certify(&given, grade, POINCARE)
 }

@@ -3,10 +3,12 @@
 //! - [`mod@run`]: the loop itself, its reasons to stop and the [`Observer`] trait;
 //! - [`level`]: one level: mesh, discrete problem, solution, estimates, and the step to the next;
 //! - [`mod@discretise`]: from the data to the discrete problem on a mesh;
+//! - [`assurance`]: what the certificate holds for, in words;
 //! - [`mod@mark`]: which triangles are refined;
 //! - [`problem`], [`settings`]: what goes in; [`record`]: the numbers that come out of a level;
 //! - [`recorder`], [`output`]: the observer that writes files, and the files.
 
+pub mod assurance;
 pub mod discretise;
 pub mod level;
 pub mod mark;
@@ -17,6 +19,7 @@ pub mod recorder;
 pub mod run;
 pub mod settings;
 
+pub use assurance::Assurance;
 pub use discretise::{DataError, discretise};
 pub use level::{Estimates, Level};
 pub use mark::mark;

@@ -2,6 +2,8 @@
 
 use contact::Reduction;
 
+use crate::assurance::Assurance;
+
 /// One level of a run. `None` does not apply. Units: see the field's formula in terms of lengths, tensions and loads;
 /// numbers are those of the user's units, the scale is already put back.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,11 +30,17 @@ pub struct LevelRecord {
     pub eta_e_sum: Option<f64>,
     /// Residual estimator.
     pub residual: Option<f64>,
+    /// The certificate: (B1).
+    pub certified: Option<f64>,
+    /// Its part for the algebraic error.
+    pub eta_alg: Option<f64>,
+    /// What the certificate holds for.
+    pub assurance: Option<Assurance>,
     /// Data oscillation.
     pub oscillation: f64,
     /// The number that the run is judged by.
     pub error_bound: f64,
-    /// Which number that is: `residual` or `paper`.
+    /// Which number that is: `rt0`, `rt1`, `residual` or `paper`.
     pub bound_kind: &'static str,
     /// error_bound / energy_norm; none when the norm is zero.
     pub relative_bound: Option<f64>,

@@ -213,7 +213,10 @@ pub fn fields(level: &Level, scale: Scale) -> LevelFields<'_> {
             .residual
             .as_ref()
             .map(|r| by(r, scale.energy_norm())),
-        certified: None,
+        certified: estimates
+            .certificate
+            .as_ref()
+            .map(|c| by(&c.local, scale.energy_norm())),
         oscillation: Some(by(&estimates.oscillation, scale.force())),
         f1_h: by(&discrete.loads[0].mean, scale.load),
         f2_h: by(&discrete.loads[1].mean, scale.load),

@@ -11,7 +11,7 @@ use crate::level::{Level, bound_unit};
 use crate::mark::mark;
 use crate::output::OutputError;
 use crate::problem::Problem;
-use crate::settings::{Settings, Stop};
+use crate::settings::{Estimator, Final, Settings, Stop};
 
 /// Runs solve, estimate, mark and refine until a rule of `settings.stop` holds.
 ///
@@ -29,8 +29,22 @@ pub fn run(
     let begun = Instant::now();
     let failed = |level: usize| move |cause: LevelError| RunError { level, cause };
     let mut level = Level::initial(problem, settings, begun).map_err(failed(0))?; // SOLVE, ESTIMATE
+    let mut sharpness = SHARPNESS;
     loop {
-        let reason = reached(&settings.stop, settings, &level, problem.scale);
+        let mut reason = reached(&settings.stop, settings, &level, problem.scale, 1.0);
+        // The sharp certificate belongs to the last level; it also decides whether this is the last one when the goal is near.
+        let sharp =
+            settings.estimate.wants(Estimator::Certified) && settings.estimate.last == Final::Sharp;
+        let near = || {
+            settings.estimate.estimator == Estimator::Certified
+                && reached(&settings.stop, settings, &level, problem.scale, sharpness).is_some()
+        };
+        if sharp && (reason.is_some() || near()) {
+            sharpness = level
+                .sharpen(problem, settings, begun)
+                .map_err(failed(level.number))?;
+            reason = reached(&settings.stop, settings, &level, problem.scale, 1.0);
+        }
         observer.level(&level, reason).map_err(|e| RunError {
             level: level.number,
             cause: e.into(),
@@ -161,16 +175,25 @@ impl From<FieldError> for LevelError {
 /// Whether a goal also counts as reached when the bound is rounding: this part of the largest element contribution.
 const ROUNDING_SHARE: f64 = 1e-12;
 
-/// The first rule that holds on a level.
-fn reached(stop: &Stop, settings: &Settings, level: &Level, scale: Scale) -> Option<Reason> {
+/// Quotient of the sharp certificate and the fast one that is expected before one has been seen: the largest measured.
+const SHARPNESS: f64 = 0.9;
+
+/// The first rule that would hold on a level whose bound is `factor` times what it is.
+fn reached(
+    stop: &Stop,
+    settings: &Settings,
+    level: &Level,
+    scale: Scale,
+    factor: f64,
+) -> Option<Reason> {
     let record = &level.record;
-    let (unit, _) = bound_unit(settings.estimate.estimator, scale);
+    let unit = bound_unit(settings.estimate.estimator, scale);
     let estimates = &level.estimates;
     let floor = ROUNDING_SHARE * estimates.largest_contribution;
     // Compared in the unit of the bound, so that neither side leaves the range of double precision.
     let norm = times_power_of_two(estimates.energy.energy_norm, scale.energy_norm() - unit);
     // A load that the mesh does not resolve is no part of the bound, so it must meet the goal by itself.
-    let within = |limit: f64| estimates.bound <= limit && estimates.unseen <= limit;
+    let within = |limit: f64| factor * estimates.bound <= limit && estimates.unseen <= limit;
     let relative = stop
         .relative_error
         .is_some_and(|goal| within(goal * norm + floor));

@@ -5,10 +5,21 @@ pub use fem_core::Children;
 /// The estimator that drives marking and stopping, or is computed beside it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Estimator {
+    /// The certificate: a guaranteed bound.
+    Certified,
     /// The residual estimator, reliable up to a constant.
     Residual,
     /// The indicators (7.1), (7.2) of the paper.
     Paper,
+}
+
+/// The certificate on the last level.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Final {
+    /// By RT1 fluxes, sharp to a few per cent.
+    Sharp,
+    /// By RT0 fluxes as on every level.
+    Fast,
 }
 
 /// Which estimators are computed.
@@ -18,6 +29,8 @@ pub struct Estimate {
     pub estimator: Estimator,
     /// Computed and written as well.
     pub also: Vec<Estimator>,
+    /// The certificate on the last level, where it is computed at all.
+    pub last: Final,
 }
 
 impl Estimate {
@@ -106,8 +119,9 @@ impl Default for Settings {
         Settings {
             solve: contact::Settings::default(),
             estimate: Estimate {
-                estimator: Estimator::Residual,
+                estimator: Estimator::Certified,
                 also: vec![Estimator::Paper, Estimator::Residual],
+                last: Final::Sharp,
             },
             mark: Mark {
                 strategy: Strategy::Doerfler,

@@ -25,6 +25,7 @@ pub fn tolerance(tolerance: Tolerance) -> String {
 /// `estimate.estimator`.
 pub fn estimator(estimator: Estimator) -> &'static str {
     match estimator {
+        Estimator::Certified => "certified",
         Estimator::Residual => "residual",
         Estimator::Paper => "paper",
     }

@@ -26,7 +26,9 @@ pub mod paper;
 pub mod residual;
 
 pub use action::{extend_to_boundary, nodal_action};
-pub use certificate::{Certificate, Given, Grade, certify};
+pub use certificate::{
+    BoundaryOscillation, Certificate, Given, Grade, boundary_oscillation, certify,
+};
 pub use efficiency::{Efficiency, efficiency};
 pub use energy::{Energy, energy};
 pub use errors::{TrueErrors, true_errors};

@@ -31,6 +31,24 @@ pub fn rule() -> [RulePoint; POINTS] {
     [centre, near[0], near[1], near[2], far[0], far[1], far[2]]
 }
 
+/// A point of [`segment_rule`].
+#[derive(Clone, Copy, Debug)]
+pub struct SegmentPoint {
+    /// Position between the ends, in (0, 1).
+    pub at: f64,
+    /// Share of the length.
+    pub weight: f64,
+}
+
+/// Gauss's rule with three points on a segment, exact to degree five.
+pub fn segment_rule() -> [SegmentPoint; 3] {
+    let half = 0.5 * 0.6f64.sqrt();
+    [(0.5 - half, 5.0), (0.5, 8.0), (0.5 + half, 5.0)].map(|(at, weight)| SegmentPoint {
+        at,
+        weight: weight / 18.0,
+    })
+}
+
 /// The affine function that fits samples at the points of the rule best.
 #[derive(Clone, Copy, Debug)]
 pub struct AffineFit {

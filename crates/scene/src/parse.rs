@@ -1,6 +1,6 @@
 //! From the tree of values to [`SceneFile`]: known keys, types and names; nothing is evaluated.
 
-use adapt::settings::{Estimator, Fields as NamedFields, Strategy};
+use adapt::settings::{Estimator, Fields as NamedFields, Final, Strategy};
 use contact::Solver;
 
 use crate::reader::{Section, boolean, choice, list, not_in_this_version, number, point, text};
@@ -30,7 +30,7 @@ const SHAPES: [&str; 4] = ["rectangle", "disk", "polygon", "mesh"];
 
 /// Names of the estimators; those without a value come later.
 const ESTIMATORS: [(&str, Option<Estimator>); 3] = [
-    ("certified", None),
+    ("certified", Some(Estimator::Certified)),
     ("residual", Some(Estimator::Residual)),
     ("paper", Some(Estimator::Paper)),
 ];
@@ -207,9 +207,10 @@ fn estimate(top: &Section<'_>) -> Result<Estimate, Fault> {
     let section = Section::new("estimate", entries, &["estimator", "also", "final"])?;
     let name = |node: &Node, path: &str| choice(node, path, &ESTIMATORS);
     let names = |node: &Node, path: &str| list(node, path, "estimator names", name);
-    let certificates = [("sharp", Some(())), ("fast", Some(()))];
-    section.get("final", |node, path| choice(node, path, &certificates))?;
+    let certificates = [("sharp", Some(Final::Sharp)), ("fast", Some(Final::Fast))];
+    let last = section.get("final", |node, path| choice(node, path, &certificates))?;
     Ok(Estimate {
+        last: last.map(|at| at.value),
         estimator: section.get("estimator", name)?.map(|at| at.value),
         also: section
             .get("also", names)?

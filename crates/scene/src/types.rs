@@ -1,6 +1,6 @@
 //! A scene as it was written: every key that was given, with its place, nothing evaluated and no default filled in.
 
-use adapt::settings::{Estimator, Strategy};
+use adapt::settings::{Estimator, Final, Strategy};
 use contact::Solver;
 
 use crate::source::{At, Place};
@@ -127,13 +127,15 @@ pub struct Solve {
     pub reduction: Option<bool>,
 }
 
-/// `[estimate]`; `final` concerns only an estimator that this version has not, its value is checked and forgotten.
+/// `[estimate]`.
 #[derive(Clone, Debug, Default)]
 pub struct Estimate {
     /// `estimator`.
     pub estimator: Option<Estimator>,
     /// `also`.
     pub also: Option<Vec<Estimator>>,
+    /// `final`.
+    pub last: Option<Final>,
 }
 
 /// `[mark]`.

@@ -357,6 +357,9 @@ impl Reader<'_> {
         let mut settings = Settings::default();
         self.solve(file, &mut settings)?;
         self.mark(file, &mut settings)?;
+        if let Some(last) = file.estimate.last {
+            settings.estimate.last = last;
+        }
         if let Some(estimator) = file.estimate.estimator {
             settings.estimate.estimator = estimator;
         }

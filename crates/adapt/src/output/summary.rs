@@ -58,7 +58,7 @@ pub struct Summary<'a> {
 
 impl Summary<'_> {
     /// The object, keys in a fixed order: how it ended; the columns of the last level under the names of the history;
-    /// `smallest_gap`; `totals` over the levels; `versions`, `machine`; the additions; `not_representable`.
+    /// `smallest_gap`; `certificate` with `bound`, `guaranteed` and `caveats`; `totals` over the levels; `versions`, `machine`; the additions; `not_representable`.
     ///
     /// What does not apply is null. JSON has no infinity: such a number is null too, and its name is listed under
     /// `not_representable` (nested names with a dot).
@@ -82,6 +82,17 @@ impl Summary<'_> {
             }
         }
         object.number("smallest_gap", last.map(|l| l.smallest_gap));
+        let certificate = last.and_then(|l| Some((l.certified?, l.assurance.as_ref()?)));
+        match certificate {
+            None => object.put("certificate", Value::Null),
+            Some((bound, assurance)) => {
+                let mut certificate = Object::within("certificate");
+                certificate.number("bound", Some(bound));
+                certificate.put("guaranteed", assurance.guaranteed);
+                certificate.put("caveats", assurance.caveats.clone());
+                object.nest("certificate", certificate);
+            }
+        }
 
         let total = |stage: fn(&LevelRecord) -> f64| Some(self.levels.iter().map(stage).sum());
         let mut totals = Object::within("totals");

@@ -1,13 +1,15 @@
 //! From reconstructed fluxes to ||mu^(-1/2)(s_i + mu_i grad u_ih)||_K and ||f_i +- lambda_h - r_i - div s_i||_K.
 
-use fem_core::integrate::{Control, Integrand, Judgement, Partition, Piece, integrate};
+use fem_core::integrate::{Control, Integrand, Judgement, Partition, Piece, WHOLE_PART, integrate};
 use fem_core::quadrature::{POINTS, affine_misfit};
-use fem_core::{FieldError, Mesh, Samples};
+use fem_core::{FieldError, Mesh, Samples, TriangleId};
 
-use super::Given;
+use super::dual_rule::DualRule;
+
 use super::fan::Corner;
 use super::moments::{Moments, contact_action};
 use super::shares::{SIGN, Shares};
+use super::{Given, POINCARE};
 
 /// Products of the two edges a, b that leave a corner counter-clockwise, and the area of the element.
 #[derive(Clone, Copy, Debug)]
@@ -64,11 +66,14 @@ pub(super) trait Reconstruction {
         shares: &Shares,
     ) -> f64;
 
-    /// Whether [`Reconstruction::subtracted`] is the divergence with the parts +-kappa_j - rho_ij/|D_j| of the dual cells.
-    fn includes_cells(&self) -> bool;
+    /// Whether the divergence of s_i lacks the parts +-kappa_j - rho_ij/|D_j| of the dual cells, which else cancel in the remainder.
+    fn lacks_cells(&self) -> bool;
 
-    /// The divergence of s_i at a point of a part of the element, with or without the parts of the dual cells.
-    fn subtracted(&self, triangle: usize, membrane: usize, part: usize, at: [f64; 3]) -> f64;
+    /// The part of the divergence of s_i that is constant on the share of every dual cell.
+    fn on_cells(&self, triangle: usize, membrane: usize) -> [f64; 3];
+
+    /// The part of the divergence of s_i that is affine in the element: its values at the corners, if there is one.
+    fn affine(&self, triangle: usize, membrane: usize) -> Option<[f64; 3]>;
 
     /// s_i + mu_iK grad u_ih at a point of a part of the element.
     fn tau(&self, triangle: usize, membrane: usize, part: usize, at: [f64; 3]) -> [f64; 2];
@@ -81,7 +86,7 @@ pub(super) struct Norms {
     pub remainder: [f64; 2],
 }
 
-/// Accuracy of the integrals; they are upper parts of a bound, and 1e-5 of it is enough.
+/// Accuracy of the integrals along jumps: a cut piece may be wrong by this part of the whole.
 const CONTROL: Control = Control {
     tolerance: 1e-6,
     local: false,
@@ -89,9 +94,13 @@ const CONTROL: Control = Control {
     largest_share: 2.0,
 };
 
-/// Evaluates the norms: in closed form where the data are constant in an element, else by quadrature on its six parts.
+/// Accuracy of the integrals elsewhere: a piece may be wrong by this part of what its element contributes.
+const LOCAL_TOLERANCE: f64 = 1e-3;
+
+/// Evaluates the norms: in closed form where the data are constant in an element, else by quadrature.
 ///
-/// `squares` holds ||tau||^2 for every element and membrane.
+/// `squares` holds ||tau||^2 for every element and membrane. Where the tensions are constants and the loads smooth, seven samples of an element do;
+/// else its six parts are sampled.
 pub(super) fn norms(
     given: &Given<'_>,
     moments: &Moments,
@@ -126,6 +135,7 @@ pub(super) fn norms(
         flux,
         fluxes,
         varying,
+        rule: DualRule::new(),
         exact,
         norms,
     };
@@ -142,33 +152,69 @@ struct Sampled<'a> {
     fluxes: &'a dyn Reconstruction,
     /// Which tensions vary.
     varying: [bool; 2],
+    rule: DualRule,
     /// Closed forms, where they hold.
     exact: Vec<Norms>,
     norms: Vec<Norms>,
 }
 
+/// A function sampled on a piece, less constants on the shares of the dual cells of an element.
+struct Remainder {
+    samples: [f64; POINTS],
+    constants: [f64; 3],
+}
+
 impl Sampled<'_> {
-    /// f_i +- lambda_h - r_i - div s_i at the points of a piece.
-    fn remainder(&self, piece: &Piece<'_>, i: usize) -> [f64; POINTS] {
+    /// f_i +- lambda_h - r_i - div s_i: what is sampled at the points of a piece, and what is constant on the dual cells.
+    fn remainder(&self, piece: &Piece<'_>, i: usize) -> Remainder {
         let t = piece.triangle;
         let v = self.given.mesh.triangles()[t].map(|j| j.index());
-        let theta = v.map(|j| self.shares.theta[j]);
-        let cell = if self.fluxes.includes_cells() {
-            self.shares.cell(i, v[piece.part / 2])
-        } else {
-            0.0
-        };
-        let samples = [0, 1, 2, 3].map(|c| piece.values(c));
-        let mut out = [0.0; POINTS];
-        for (k, at) in piece.at.iter().enumerate() {
-            let [f1, f2, m1, m2] = samples.map(|s| s[k]);
-            let share = at[0] * theta[0] + at[1] * theta[1] + at[2] * theta[2];
-            let action = share * contact_action([m1, m2], [f1, f2]);
-            let load = if i == 0 { f1 } else { f2 };
-            let divergence = self.fluxes.subtracted(t, i, piece.part, *at);
-            out[k] = load + SIGN[i] * action + cell - divergence;
+        let mut constants = self.fluxes.on_cells(t, i);
+        if self.fluxes.lacks_cells() {
+            for (c, &j) in constants.iter_mut().zip(&v) {
+                *c -= self.shares.cell(i, j);
+            }
         }
-        out
+        let share = v.map(|j| SIGN[i] * self.shares.theta[j]);
+        let (load, action) = (piece.values(i), piece.values(ACTION));
+        let affine = self.fluxes.affine(t, i).unwrap_or([0.0; 3]);
+        let mut samples = [0.0; POINTS];
+        for (k, at) in piece.at.iter().enumerate() {
+            let theta = at[0] * share[0] + at[1] * share[1] + at[2] * share[2];
+            let divergence = at[0] * affine[0] + at[1] * affine[1] + at[2] * affine[2];
+            samples[k] = load[k] + theta * action[k] - divergence;
+        }
+        Remainder { samples, constants }
+    }
+
+    /// Square of the remainder over a piece, and an estimate of the error of that.
+    fn judged_remainder(&self, piece: &Piece<'_>, i: usize) -> (f64, f64) {
+        let Remainder { samples, constants } = self.remainder(piece, i);
+        if piece.part == WHOLE_PART {
+            let (square, misfit) = self.rule.square(&samples, constants);
+            let largest = constants
+                .iter()
+                .flat_map(|c| samples.iter().map(move |s| (s - c).abs()))
+                .fold(0.0f64, f64::max);
+            // The quadratic fit is wrong by about its misfit. One number says little of a jump: for smooth samples the square of the affine
+            // misfit over their range is as small, for a jump all three are of its size.
+            let affine = affine_misfit(piece.rule, &samples);
+            let (low, high) = samples
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &s| {
+                    (l.min(s), h.max(s))
+                });
+            let bent = if affine == 0.0 {
+                0.0
+            } else {
+                affine * (affine / (high - low))
+            };
+            let misfit = 3.0 * misfit.max(bent);
+            let error = misfit * (2.0 * largest + misfit);
+            return (piece.area * square, piece.area * error);
+        }
+        let c = constants[piece.part / 2];
+        judged(piece, &samples.map(|s| s - c))
     }
 
     /// mu_i^(-1/2) (s_i + mu_i grad u_ih) at the points of a piece.
@@ -178,7 +224,7 @@ impl Sampled<'_> {
         let q = self.flux[i][t];
         let mut out = [[0.0; POINTS]; 2];
         for (k, at) in piece.at.iter().enumerate() {
-            let mu = piece.values(2 + i)[k];
+            let mu = piece.values(TENSION + i)[k];
             let tau = self.fluxes.tau(t, i, piece.part, *at);
             let (excess, root) = ((mu - mean) / mean, mu.sqrt());
             for c in 0..2 {
@@ -190,10 +236,27 @@ impl Sampled<'_> {
 
     /// Weight of the remainder beside the misfit: C_K^2/mu_i.
     fn weight(&self, t: usize, i: usize) -> f64 {
-        let shape = self.given.mesh.shape(fem_core::TriangleId(t as u32));
-        (shape.diameter() / super::POINCARE).powi(2) / self.moments.stiffness_low[i][t]
+        let shape = self.given.mesh.shape(TriangleId(t as u32));
+        (shape.diameter() / POINCARE).powi(2) / self.moments.stiffness_low[i][t]
+    }
+
+    /// What the closed form of the misfit says of a piece.
+    fn share_of_misfit(&self, piece: &Piece<'_>) -> f64 {
+        let [first, second] = self.exact[piece.triangle].misfit;
+        let area = self
+            .given
+            .mesh
+            .shape(TriangleId(piece.triangle as u32))
+            .area;
+        (first + second) * piece.area / area
     }
 }
+
+/// Component of the samples that holds lambda*.
+const ACTION: usize = 2;
+
+/// Component that holds mu_1, with mu_2 after it; both only where a tension varies.
+const TENSION: usize = 3;
 
 fn sum(piece: &Piece<'_>, values: &[f64; POINTS]) -> f64 {
     let sum: f64 = piece
@@ -217,13 +280,33 @@ fn judged(piece: &Piece<'_>, values: &[f64; POINTS]) -> (f64, f64) {
     (sum(piece, values), piece.area * error)
 }
 
+/// An error that does not matter beside the element's own contribution counts as none.
+fn relevant(magnitude: f64, error: f64) -> Judgement {
+    Judgement {
+        magnitude,
+        error: if error <= LOCAL_TOLERANCE * magnitude {
+            0.0
+        } else {
+            error
+        },
+    }
+}
+
 impl Integrand for Sampled<'_> {
     fn components(&self) -> usize {
-        4
+        if self.varying == [false; 2] {
+            TENSION
+        } else {
+            TENSION + 2
+        }
     }
 
     fn partition(&self) -> Partition {
-        Partition::Dual
+        if self.varying == [false; 2] {
+            Partition::WholeThenDual
+        } else {
+            Partition::Dual
+        }
     }
 
     fn skips(&self, triangle: usize) -> bool {
@@ -231,49 +314,52 @@ impl Integrand for Sampled<'_> {
     }
 
     fn sample(&mut self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
-        let [f1, f2] = self.given.load;
-        let [m1, m2] = self.given.tension;
-        for (field, out) in [f1, f2, m1, m2].iter().zip(out.chunks_mut(at.len().max(1))) {
-            field.sample(at, out)?;
+        let n = at.len();
+        let (loads, rest) = out.split_at_mut(2 * n);
+        let (action, tensions) = rest.split_at_mut(n);
+        for i in 0..2 {
+            self.given.load[i].sample(at, &mut loads[i * n..(i + 1) * n])?;
+        }
+        if let [Some(m1), Some(m2)] = self.given.tension.map(|f| f.constant()) {
+            let (first, second) = (m1 / (m1 + m2), m2 / (m1 + m2));
+            for k in 0..n {
+                action[k] = (first * loads[n + k] - second * loads[k]).max(0.0);
+            }
+            return Ok(());
+        }
+        for i in 0..2 {
+            self.given.tension[i].sample(at, &mut tensions[i * n..(i + 1) * n])?;
+        }
+        for k in 0..n {
+            action[k] = contact_action([tensions[k], tensions[n + k]], [loads[k], loads[n + k]]);
         }
         Ok(())
     }
 
     fn judge(&self, piece: &Piece<'_>) -> Judgement {
-        let mut result = Judgement {
-            magnitude: 0.0,
-            error: 0.0,
-        };
         let t = piece.triangle;
+        let (mut magnitude, mut error) = (self.share_of_misfit(piece), 0.0);
         if !self.moments.uniform[t] {
             for i in 0..2 {
-                let (square, error) = judged(piece, &self.remainder(piece, i));
+                let (square, wrong) = self.judged_remainder(piece, i);
                 let weight = self.weight(t, i);
-                result.magnitude += weight * square;
-                result.error += weight * error;
+                magnitude += weight * square;
+                error += weight * wrong;
             }
         }
-        // Beside a misfit that is far larger the remainder needs no digits of its own.
-        for i in 0..2 {
-            result.magnitude += self.exact[t].misfit[i] * piece.area
-                / self.given.mesh.shape(fem_core::TriangleId(t as u32)).area;
-        }
-        result
+        relevant(magnitude, error)
     }
 
     fn judge_second(&self, piece: &Piece<'_>) -> Judgement {
-        let mut result = Judgement {
-            magnitude: 0.0,
-            error: 0.0,
-        };
+        let (mut magnitude, mut error) = (0.0, 0.0);
         for i in (0..2).filter(|&i| self.varying[i]) {
             for component in self.misfit(piece, i) {
-                let (square, error) = judged(piece, &component);
-                result.magnitude += square;
-                result.error += error;
+                let (square, wrong) = judged(piece, &component);
+                magnitude += square;
+                error += wrong;
             }
         }
-        result
+        relevant(magnitude, error)
     }
 
     fn clear(&mut self, t: usize) {
@@ -290,7 +376,7 @@ impl Integrand for Sampled<'_> {
         let t = piece.triangle;
         for i in 0..2 {
             if !self.moments.uniform[t] {
-                self.norms[t].remainder[i] += sum(piece, &self.remainder(piece, i));
+                self.norms[t].remainder[i] += self.judged_remainder(piece, i).0;
             }
             if self.varying[i] {
                 let [x, y] = self.misfit(piece, i);

@@ -14,6 +14,8 @@
 //!
 //! The steps: moments of the data, shares of the forces (`shares`), fluxes of one of two grades (`rt0`, `rt1`), norms.
 
+mod boundary;
+mod dual_rule;
 mod fan;
 mod misfit;
 mod moments;
@@ -25,6 +27,7 @@ mod shares;
 use fem_core::{Field, FieldError, Mesh};
 
 use crate::gradients::gradients;
+pub use boundary::{BoundaryOscillation, boundary_oscillation};
 use misfit::{Norms, norms};
 pub use moments::JUMP;
 use moments::{Moments, product};

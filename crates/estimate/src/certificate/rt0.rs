@@ -155,13 +155,17 @@ impl Reconstruction for Fluxes<'_> {
         UNIFORM * area * super::misfit::pairs(p)
     }
 
-    fn subtracted(&self, triangle: usize, membrane: usize, part: usize, _: [f64; 3]) -> f64 {
-        // kappa_j and rho_ij stand in data and divergence alike.
-        self.balance[triangle][part / 2][membrane]
+    fn lacks_cells(&self) -> bool {
+        false
     }
 
-    fn includes_cells(&self) -> bool {
-        false
+    fn on_cells(&self, triangle: usize, membrane: usize) -> [f64; 3] {
+        // kappa_j and rho_ij stand in data and divergence alike.
+        self.balance[triangle].map(|b| b[membrane])
+    }
+
+    fn affine(&self, _: usize, _: usize) -> Option<[f64; 3]> {
+        None
     }
 
     fn tau(&self, triangle: usize, membrane: usize, part: usize, at: [f64; 3]) -> [f64; 2] {

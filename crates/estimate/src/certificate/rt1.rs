@@ -369,17 +369,21 @@ impl Reconstruction for Fluxes<'_> {
         UNIFORM * area * pairs(v.map(|j| shares.cell(membrane, j.index())))
     }
 
-    fn includes_cells(&self) -> bool {
+    fn lacks_cells(&self) -> bool {
         true
     }
 
-    fn subtracted(&self, triangle: usize, membrane: usize, _: usize, at: [f64; 3]) -> f64 {
+    fn on_cells(&self, _: usize, _: usize) -> [f64; 3] {
+        [0.0; 3]
+    }
+
+    fn affine(&self, triangle: usize, membrane: usize) -> Option<[f64; 3]> {
         let Divergence {
             constant,
             linear: [c1, c2],
         } = Divergence::of(self.divergence[triangle][membrane]);
         let det = 2.0 * self.area(triangle);
-        (constant + 3.0 * (c1 * at[1] + c2 * at[2])) / det
+        Some([constant, constant + 3.0 * c1, constant + 3.0 * c2].map(|d| d / det))
     }
 
     fn tau(&self, triangle: usize, membrane: usize, _: usize, at: [f64; 3]) -> [f64; 2] {

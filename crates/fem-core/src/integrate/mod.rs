@@ -60,7 +60,12 @@ pub enum Partition {
     /// The six triangles between the medians: part 2k has the corners k, middle of the edge (k, k+1), barycentre, and part 2k + 1 the
     /// corners k, barycentre, middle of the edge (k, k+2). Parts 2k and 2k + 1 are the dual cell of corner k.
     Dual,
+    /// The element itself (as part [`WHOLE_PART`]), and its six parts where that is not enough.
+    WholeThenDual,
 }
+
+/// The number that [`Piece::part`] has for a whole element beside the six parts.
+pub const WHOLE_PART: usize = 6;
 
 /// Samples on one element or a part of it.
 #[derive(Clone, Copy, Debug)]
@@ -136,6 +141,7 @@ impl Partition {
         };
         match self {
             Partition::Whole => push(0, 1.0, WHOLE),
+            Partition::WholeThenDual => push(WHOLE_PART, 1.0, WHOLE),
             Partition::Dual => {
                 let third = 1.0 / 3.0;
                 let centre = [third; 3];
@@ -155,7 +161,7 @@ impl Partition {
 
     fn count(self) -> usize {
         match self {
-            Partition::Whole => 1,
+            Partition::Whole | Partition::WholeThenDual => 1,
             Partition::Dual => 6,
         }
     }
@@ -237,8 +243,12 @@ pub fn integrate(
         if control.depth > 0 && too_large(t, errors[t]) {
             integrand.clear(t);
             begin.clear();
-            partition.parts(t as u32, &mut begin);
-            begin.iter().for_each(|part| quarter(part, &mut stack));
+            if partition == Partition::WholeThenDual {
+                Partition::Dual.parts(t as u32, &mut stack);
+            } else {
+                partition.parts(t as u32, &mut begin);
+                begin.iter().for_each(|part| quarter(part, &mut stack));
+            }
         }
         // Work the stack off whenever a block is full, so that it stays small.
         while stack.len() >= BLOCK || (t + 1 == count && !stack.is_empty()) {
