@@ -2,7 +2,7 @@
 
 use adapt::settings::{Estimator, Final, Strategy};
 use estimate::certificate::POINCARE;
-use estimate::{Certificate, Given, Grade, certify};
+use estimate::{Certificate, Given, Grade, Moments, certify};
 use fem_core::scale::times_power_of_two;
 
 use crate::cases::{Grid, levels, on, solve, uniform};
@@ -15,10 +15,18 @@ fn certificate(
     grade: Grade,
     poincare: f64,
 ) -> Certificate {
+    let load = [&*problem.load[0], &*problem.load[1]];
+    let tension = [&*problem.tension[0], &*problem.tension[1]];
+    let mean = &level.discrete.tension_mean;
+    let moments = match &level.moments {
+        Some(moments) => moments.clone(),
+        None => Moments::of(&level.mesh, load, tension, mean).expect("good data"),
+    };
     let given = Given {
         mesh: &level.mesh,
-        load: [&*problem.load[0], &*problem.load[1]],
-        tension: [&*problem.tension[0], &*problem.tension[1]],
+        load,
+        tension,
+        moments: &moments,
         tension_mean: &level.discrete.tension_mean,
         displacement: &level.solution.displacement,
         force: &level.solution.force,

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use contact::DiscreteProblem;
-use fem_core::integrate::{load_pair, means};
+use estimate::Moments;
+use fem_core::integrate::{Loads, load_pair, means};
 use fem_core::{Field, FieldError, Mesh, Samples};
 
 use crate::problem::Problem;
@@ -45,6 +46,32 @@ pub enum DataError {
 /// # Errors
 /// [`DataError`] where data are not finite, a tension is not positive, or g1 < g2.
 pub fn discretise(problem: &Problem, mesh: &Mesh) -> Result<DiscreteProblem, DataError> {
+    let loads = || load_pair(mesh, [&*problem.load[0], &*problem.load[1]]);
+    let (discrete, ()) = assemble(problem, mesh, |_| Ok((loads()?, ())))?;
+    Ok(discrete)
+}
+
+/// The same with the moments that the certificate needs; the data are sampled once for both.
+///
+/// # Errors
+/// As [`discretise`].
+pub fn discretise_with_moments(
+    problem: &Problem,
+    mesh: &Mesh,
+) -> Result<(DiscreteProblem, Moments), DataError> {
+    assemble(problem, mesh, |tension_mean| {
+        let load = [&*problem.load[0], &*problem.load[1]];
+        let tension = [&*problem.tension[0], &*problem.tension[1]];
+        let moments = Moments::of(mesh, load, tension, tension_mean)?;
+        Ok((moments.loads(mesh), moments))
+    })
+}
+
+fn assemble<T>(
+    problem: &Problem,
+    mesh: &Mesh,
+    loads: impl FnOnce(&[Vec<f64>; 2]) -> Result<([Loads; 2], T), FieldError>,
+) -> Result<(DiscreteProblem, T), DataError> {
     let physical = |v: f64| fem_core::scale::times_power_of_two(v, problem.scale.length);
     let tension = [
         means(mesh, &*problem.tension[0])?,
@@ -69,8 +96,8 @@ pub fn discretise(problem: &Problem, mesh: &Mesh) -> Result<DiscreteProblem, Dat
         let excess = fem_core::scale::times_power_of_two(excess, problem.scale.displacement());
         return Err(DataError::Heights { x, y, excess });
     }
-    let loads = load_pair(mesh, [&*problem.load[0], &*problem.load[1]])?;
-    Ok(DiscreteProblem::new(mesh, tension, loads, heights))
+    let (loads, rest) = loads(&tension)?;
+    Ok((DiscreteProblem::new(mesh, tension, loads, heights), rest))
 }
 
 /// Heights at the boundary vertices, 0 inside; `region` there is that of a triangle with an edge on the boundary.

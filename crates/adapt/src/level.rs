@@ -4,12 +4,12 @@ use std::time::Instant;
 
 use contact::{DiscreteProblem, Solution, Start};
 use estimate::certificate::POINCARE;
-use estimate::{Certificate, Energy, Given, Grade, Paper, TrueErrors, certify, root_sum};
+use estimate::{Certificate, Energy, Given, Grade, Moments, Paper, TrueErrors, certify, root_sum};
 use fem_core::scale::times_power_of_two;
 use fem_core::{FieldError, Mesh, Scale, TriangleId};
 
 use crate::assurance::Assurance;
-use crate::discretise::discretise;
+use crate::discretise::{discretise, discretise_with_moments};
 use crate::output::memory::peak_memory_mb;
 use crate::problem::Problem;
 use crate::record::LevelRecord;
@@ -25,6 +25,8 @@ pub struct Level {
     pub mesh: Mesh,
     /// Matrices and loads.
     pub discrete: DiscreteProblem,
+    /// Moments of the data, where the certificate is wanted.
+    pub moments: Option<Moments>,
     /// Displacements, action, Riesz representative, contact set.
     pub solution: Solution,
     /// Indicators and errors.
@@ -113,9 +115,13 @@ impl Level {
         begun: Instant,
     ) -> Result<f64, LevelError> {
         let clock = Instant::now();
+        let Some(moments) = &self.moments else {
+            return Ok(1.0);
+        };
         let sharp = certified(
             &self.mesh,
             &self.discrete,
+            moments,
             &self.solution,
             problem,
             Grade::Rt1,
@@ -155,13 +161,25 @@ impl Level {
         steps: Steps,
     ) -> Result<Level, LevelError> {
         let clock = Instant::now();
-        let discrete = discretise(problem, &mesh)?;
+        let (discrete, moments) = if settings.estimate.wants(Estimator::Certified) {
+            let (discrete, moments) = discretise_with_moments(problem, &mesh)?;
+            (discrete, Some(moments))
+        } else {
+            (discretise(problem, &mesh)?, None)
+        };
         let assemble = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let solution = contact::solve(&discrete, &settings.solve, carried.as_ref())?;
         let solve = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let estimates = Estimates::of(&mesh, &discrete, &solution, problem, settings)?;
+        let estimates = Estimates::of(
+            &mesh,
+            &discrete,
+            moments.as_ref(),
+            &solution,
+            problem,
+            settings,
+        )?;
         let mut record = record(&mesh, &discrete, &solution, &estimates, problem, settings)?;
         record.level = steps.number;
         record.seconds_refine = steps.refine;
@@ -174,6 +192,7 @@ impl Level {
             number: steps.number,
             mesh,
             discrete,
+            moments,
             solution,
             estimates,
             record,
@@ -192,6 +211,7 @@ impl Estimates {
     fn of(
         mesh: &Mesh,
         discrete: &DiscreteProblem,
+        moments: Option<&Moments>,
         solution: &Solution,
         problem: &Problem,
         settings: &Settings,
@@ -211,9 +231,16 @@ impl Estimates {
             )?),
             None => None,
         };
-        let certificate = match wants(Estimator::Certified) {
-            true => Some(certified(mesh, discrete, solution, problem, Grade::Rt0)?),
-            false => None,
+        let certificate = match moments {
+            Some(moments) => Some(certified(
+                mesh,
+                discrete,
+                moments,
+                solution,
+                problem,
+                Grade::Rt0,
+            )?),
+            None => None,
         };
         let weighted = settings.estimate.estimator != Estimator::Paper;
         let seen = settings.estimate.estimator == Estimator::Certified;
@@ -405,6 +432,7 @@ pub(crate) fn bound_unit(estimator: Estimator, scale: Scale) -> i32 {
 fn certified(
     mesh: &Mesh,
     discrete: &DiscreteProblem,
+    moments: &Moments,
     solution: &Solution,
     problem: &Problem,
     grade: Grade,
@@ -413,6 +441,7 @@ fn certified(
         mesh,
         load: [&*problem.load[0], &*problem.load[1]],
         tension: [&*problem.tension[0], &*problem.tension[1]],
+        moments,
         tension_mean: &discrete.tension_mean,
         displacement: &solution.displacement,
         force: &solution.force,

@@ -20,7 +20,7 @@ pub mod run;
 pub mod settings;
 
 pub use assurance::Assurance;
-pub use discretise::{DataError, discretise};
+pub use discretise::{DataError, discretise, discretise_with_moments};
 pub use level::{Estimates, Level};
 pub use mark::mark;
 pub use problem::Problem;

@@ -27,7 +27,7 @@ pub mod residual;
 
 pub use action::{extend_to_boundary, nodal_action};
 pub use certificate::{
-    BoundaryOscillation, Certificate, Given, Grade, boundary_oscillation, certify,
+    BoundaryOscillation, Certificate, Given, Grade, Moments, boundary_oscillation, certify,
 };
 pub use efficiency::{Efficiency, efficiency};
 pub use energy::{Energy, energy};

@@ -75,8 +75,14 @@ pub(super) trait Reconstruction {
     /// The part of the divergence of s_i that is affine in the element: its values at the corners, if there is one.
     fn affine(&self, triangle: usize, membrane: usize) -> Option<[f64; 3]>;
 
-    /// s_i + mu_iK grad u_ih at a point of a part of the element.
-    fn tau(&self, triangle: usize, membrane: usize, part: usize, at: [f64; 3]) -> [f64; 2];
+    /// s_i + mu_iK grad u_ih at points of a part of the element, given by their barycentric coordinates.
+    fn tau(
+        &self,
+        triangle: usize,
+        membrane: usize,
+        part: usize,
+        at: &[[f64; 3]; POINTS],
+    ) -> [[f64; 2]; POINTS];
 }
 
 /// The two norms on every element, squared: misfit (with the weight 1/mu_i) and remainder, for both membranes.
@@ -223,9 +229,9 @@ impl Sampled<'_> {
         let mean = self.given.tension_mean[i][t];
         let q = self.flux[i][t];
         let mut out = [[0.0; POINTS]; 2];
-        for (k, at) in piece.at.iter().enumerate() {
+        let taus = self.fluxes.tau(t, i, piece.part, piece.at);
+        for (k, tau) in taus.iter().enumerate() {
             let mu = piece.values(TENSION + i)[k];
-            let tau = self.fluxes.tau(t, i, piece.part, *at);
             let (excess, root) = ((mu - mean) / mean, mu.sqrt());
             for c in 0..2 {
                 out[c][k] = (tau[c] + excess * q[c]) / root;

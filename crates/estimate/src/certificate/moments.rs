@@ -4,7 +4,9 @@
 //! tensions is constant. All integrals here use the same points as the load vectors ([`fem_core::integrate::load_pair`]), so that
 //! what cancels between loads and action cancels between their moments too.
 
-use fem_core::integrate::{Integrand, Judgement, LOAD_CONTROL, Piece, integrate, judge_load};
+use fem_core::integrate::{
+    Integrand, Judgement, LOAD_CONTROL, Loads, Piece, integrate, judge_load,
+};
 use fem_core::quadrature::affine_fit;
 use fem_core::{Field, FieldError, Mesh, Samples};
 
@@ -23,20 +25,23 @@ pub(super) fn against_hat(products: &Products, k: usize) -> f64 {
     products[product(k, 0)] + products[product(k, 1)] + products[product(k, 2)]
 }
 
-/// What is known of the data in every element.
-pub(super) struct Moments {
+/// What is known of the data in every element; scaled.
+#[derive(Clone, Debug)]
+pub struct Moments {
     /// Of f_1 and f_2.
-    pub load: [Vec<Products>; 2],
+    pub(super) load: [Vec<Products>; 2],
     /// Of lambda*.
-    pub action: Vec<Products>,
+    pub(super) action: Vec<Products>,
     /// Whether all samples of loads and tensions in the element are equal.
-    pub uniform: Vec<bool>,
+    pub(super) uniform: Vec<bool>,
     /// Mean of 1/mu_i.
-    pub softness: [Vec<f64>; 2],
+    pub(super) softness: [Vec<f64>; 2],
     /// A lower bound for mu_i, from its samples and their trend towards the corners.
-    pub stiffness_low: [Vec<f64>; 2],
+    pub(super) stiffness_low: [Vec<f64>; 2],
     /// Number of elements in which the samples of a tension differ by more than a factor [`JUMP`].
-    pub jumps: usize,
+    pub(super) jumps: usize,
+    /// A value of f_i in the element, and the first two moments of f_i minus that value.
+    spread: [Vec<[f64; 3]>; 2],
 }
 
 /// Quotient of the largest and the smallest sample of a tension in an element that counts as a jump inside.
@@ -53,6 +58,11 @@ pub(super) fn contact_action(tension: [f64; 2], load: [f64; 2]) -> f64 {
 
 impl Moments {
     /// Integrates over all elements; O(N), and no samples where all data are constants.
+    ///
+    /// `tension_mean` holds the means of the tensions over the elements.
+    ///
+    /// # Errors
+    /// A value of a load or a tension that is not finite.
     pub fn of(
         mesh: &Mesh,
         load: [&dyn Field; 2],
@@ -69,6 +79,7 @@ impl Moments {
             softness: [inverse(&tension_mean[0]), inverse(&tension_mean[1])],
             stiffness_low: tension_mean.clone(),
             jumps: 0,
+            spread: [Vec::new(), Vec::new()],
         };
         if let [Some(f1), Some(f2), Some(m1), Some(m2)] = constants {
             let action = contact_action([m1, m2], [f1, f2]);
@@ -79,10 +90,12 @@ impl Moments {
             };
             result.load = [products(f1), products(f2)];
             result.action = products(action);
+            result.spread = [f1, f2].map(|f| vec![[f, 0.0, 0.0]; count]);
             return Ok(result);
         }
         result.load = [vec![[0.0; 6]; count], vec![[0.0; 6]; count]];
         result.action = vec![[0.0; 6]; count];
+        result.spread = [vec![[0.0; 3]; count], vec![[0.0; 3]; count]];
         let varying = [tension[0], tension[1]].map(|f| f.constant().is_none());
         let mut range = [Vec::new(), Vec::new()];
         for i in 0..2 {
@@ -113,6 +126,29 @@ impl Moments {
         }
         moments.jumps = jump.iter().filter(|j| **j).count();
         Ok(moments)
+    }
+
+    /// The load vectors, means and deviations, as [`fem_core::integrate::load_pair`] finds them.
+    pub fn loads(&self, mesh: &Mesh) -> [Loads; 2] {
+        [0, 1].map(|i| {
+            let mut loads = Loads {
+                nodal: vec![0.0; mesh.vertex_count()],
+                mean: Vec::with_capacity(mesh.triangle_count()),
+                deviation_squared: Vec::with_capacity(mesh.triangle_count()),
+            };
+            for (t, id) in mesh.triangle_ids().enumerate() {
+                for (k, v) in mesh.triangles()[t].iter().enumerate() {
+                    loads.nodal[v.index()] += against_hat(&self.load[i][t], k);
+                }
+                let area = mesh.shape(id).area;
+                let [base, first, second] = self.spread[i][t];
+                loads.mean.push(base + first / area);
+                loads
+                    .deviation_squared
+                    .push((second - first * first / area).max(0.0));
+            }
+            loads
+        })
     }
 }
 
@@ -166,6 +202,8 @@ impl Integrand for Sums<'_> {
         moments.load[1][t] = [0.0; 6];
         moments.action[t] = [0.0; 6];
         moments.uniform[t] = true;
+        moments.spread[0][t] = [0.0; 3];
+        moments.spread[1][t] = [0.0; 3];
         self.first[t] = None;
         for i in (0..2).filter(|&i| self.varying[i]) {
             moments.softness[i][t] = 0.0;
@@ -185,6 +223,13 @@ impl Integrand for Sums<'_> {
             let weight = point.weight * piece.area;
             let [f1, f2, m1, m2] = sample;
             let action = contact_action([m1, m2], [f1, f2]);
+            for i in 0..2 {
+                let [base, one, two] = &mut moments.spread[i][t];
+                *base = first[i];
+                let d = sample[i] - first[i];
+                *one += weight * d;
+                *two += weight * d * d;
+            }
             let shapes = [
                 at[0] * at[0],
                 at[1] * at[1],

@@ -8,7 +8,8 @@
 //! Everything here is written for tau: no flux through the outer edges, the divergence of s_i, and jumps
 //! [mu_iK grad u_ih] . n through the spokes that are parts of mesh edges.
 
-use fem_core::{Mesh, Shape, TriangleId};
+use fem_core::quadrature::POINTS;
+use fem_core::{Mesh, TriangleId};
 
 use super::fan::{Corner, Fan, beginnings};
 use super::misfit::{Frame, Reconstruction};
@@ -168,28 +169,33 @@ impl Reconstruction for Fluxes<'_> {
         None
     }
 
-    fn tau(&self, triangle: usize, membrane: usize, part: usize, at: [f64; 3]) -> [f64; 2] {
+    fn tau(
+        &self,
+        triangle: usize,
+        membrane: usize,
+        part: usize,
+        at: &[[f64; 3]; POINTS],
+    ) -> [[f64; 2]; POINTS] {
         let k = part / 2;
-        let shape: Shape = self.mesh.shape(TriangleId(triangle as u32));
+        let shape = self.mesh.shape(TriangleId(triangle as u32));
         let corner = |l: usize| shape.corners[(k + l) % 3];
         let v = corner(0);
-        let centre = [0, 1].map(|c| (v[c] + corner(1)[c] + corner(2)[c]) / 3.0);
-        let point = |c: usize| {
-            at[0] * shape.corners[0][c] + at[1] * shape.corners[1][c] + at[2] * shape.corners[2][c]
-        };
         let [alpha, h] = self.spokes[triangle][k][membrane];
         // Entering and leaving flux, and the points opposite to the spokes that they pass.
+        let centre = [0, 1].map(|c| (v[c] + corner(1)[c] + corner(2)[c]) / 3.0);
+        let middle = |l: usize| [0, 1].map(|c| 0.5 * (v[c] + corner(l)[c]));
         let (enters, leaves, opposite, other) = if part % 2 == 0 {
-            let m = [0, 1].map(|c| 0.5 * (v[c] + corner(1)[c]));
-            (alpha, alpha + h, centre, m)
+            (alpha, alpha + h, centre, middle(1))
         } else {
-            let m = [0, 1].map(|c| 0.5 * (v[c] + corner(2)[c]));
-            (alpha + h, alpha + 2.0 * h, m, centre)
+            (alpha + h, alpha + 2.0 * h, middle(2), centre)
         };
         let twice = shape.area / 3.0;
-        [0, 1].map(|c| {
-            let x = point(c);
-            (leaves * (x - other[c]) - enters * (x - opposite[c])) / twice
+        let [p, q, r] = shape.corners;
+        at.map(|at| {
+            [0, 1].map(|c| {
+                let x = at[0] * p[c] + at[1] * q[c] + at[2] * r[c];
+                (leaves * (x - other[c]) - enters * (x - opposite[c])) / twice
+            })
         })
     }
 }

@@ -16,6 +16,7 @@
 //! rows, solved by elimination in O(n).
 
 use fem_core::Mesh;
+use fem_core::quadrature::POINTS;
 
 use super::fan::{Corner, Fan, beginnings};
 use super::misfit::{CornerFrame, Frame, Reconstruction, pairs};
@@ -386,19 +387,26 @@ impl Reconstruction for Fluxes<'_> {
         Some([constant, constant + 3.0 * c1, constant + 3.0 * c2].map(|d| d / det))
     }
 
-    fn tau(&self, triangle: usize, membrane: usize, _: usize, at: [f64; 3]) -> [f64; 2] {
+    fn tau(
+        &self,
+        triangle: usize,
+        membrane: usize,
+        _: usize,
+        at: &[[f64; 3]; POINTS],
+    ) -> [[f64; 2]; POINTS] {
         let field = element_field(
             &self.edges[triangle][membrane],
             self.divergence[triangle][membrane],
         );
-        let (x, y) = (at[1], at[2]);
-        let monomials = [[1.0, x, y, x * x, x * y], [1.0, x, y, x * y, y * y]];
-        let value =
-            [0, 1].map(|c| -> f64 { field[c].iter().zip(&monomials[c]).map(|(f, m)| f * m).sum() });
         let shape = self.mesh.shape(fem_core::TriangleId(triangle as u32));
         let [p, q, r] = shape.corners;
         let det = 2.0 * shape.area;
-        [0, 1].map(|c| ((q[c] - p[c]) * value[0] + (r[c] - p[c]) * value[1]) / det)
+        at.map(|[_, x, y]| {
+            let monomials = [[1.0, x, y, x * x, x * y], [1.0, x, y, x * y, y * y]];
+            let value = [0, 1]
+                .map(|c| -> f64 { field[c].iter().zip(&monomials[c]).map(|(f, m)| f * m).sum() });
+            [0, 1].map(|c| ((q[c] - p[c]) * value[0] + (r[c] - p[c]) * value[1]) / det)
+        })
     }
 }
 
