@@ -12,6 +12,8 @@ struct Known {
     force: Option<(f64, f64)>,
     /// Bound over true error.
     effectivity: Option<(f64, f64)>,
+    /// Whether the bound is proved: heights affine along the edges, a domain with straight sides.
+    guaranteed: bool,
 }
 
 const KNOWN: [Known; 6] = [
@@ -20,35 +22,40 @@ const KNOWN: [Known; 6] = [
         reduction: "constant-tensions",
         area: Some((0.5 * PI, 0.05)),
         force: Some((0.05 * PI, 0.01)),
-        effectivity: Some((5.0, 6.5)),
+        effectivity: Some((1.0, 1.1)),
+        guaranteed: false,
     },
     Known {
         name: "square",
         reduction: "constant-tensions",
         area: Some((0.25 * PI, 0.08)),
         force: Some((0.625 * PI, 0.01)),
-        effectivity: Some((4.5, 7.0)),
+        effectivity: Some((1.0, 1.1)),
+        guaranteed: true,
     },
     Known {
         name: "lshape",
         reduction: "constant-tensions",
         area: Some((PI / 16.0, 0.15)),
         force: Some((0.078125 * PI, 0.02)),
-        effectivity: Some((4.5, 7.0)),
+        effectivity: Some((1.0, 1.1)),
+        guaranteed: true,
     },
     Known {
         name: "full-contact",
         reduction: "full-contact",
         area: Some((4.0, 0.1)),
         force: Some((32.0 / 3.0, 0.02)),
-        effectivity: Some((4.5, 7.0)),
+        effectivity: Some((1.0, 1.1)),
+        guaranteed: true,
     },
     Known {
         name: "no-contact",
         reduction: "no-contact",
         area: Some((0.0, 0.0)),
         force: Some((0.0, 0.0)),
-        effectivity: Some((4.5, 7.0)),
+        effectivity: Some((1.0, 1.1)),
+        guaranteed: true,
     },
     Known {
         name: "tension-jump",
@@ -56,7 +63,8 @@ const KNOWN: [Known; 6] = [
         // The contact force is a 1e-4 part of the load: the contact set is found late.
         area: Some((0.16 * PI, 0.6)),
         force: None,
-        effectivity: Some((4.5, 7.0)),
+        effectivity: Some((1.0, 1.1)),
+        guaranteed: true,
     },
 ];
 
@@ -99,6 +107,16 @@ fn scenes_with_known_solutions() {
             println!("{name} effectivity: {effectivity}");
             assert!((low..high).contains(&effectivity), "{name}: {effectivity}");
         }
+        assert_eq!(summary["bound_kind"], "rt1", "{name}");
+        let relative = number(&run, "relative_bound");
+        assert!(relative <= 0.03, "{name}: {relative}");
+        let certificate = &summary["certificate"];
+        assert_eq!(certificate["bound"], summary["error_bound"], "{name}");
+        assert_eq!(
+            certificate["guaranteed"],
+            known.guaranteed,
+            "{name}: {certificate}"
+        );
         assert!(number(&run, "kkt_residual") <= 1e-12, "{name}");
         assert!(number(&run, "smallest_gap") >= 0.0, "{name}");
     }

@@ -195,6 +195,7 @@ fn reads_back(name: &str, extra: &[&str]) {
                 "eta_K",
                 "eta_e",
                 "residual",
+                "certified",
                 "oscillation",
                 "f1_h",
                 "f2_h",
