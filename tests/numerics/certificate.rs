@@ -1,17 +1,28 @@
 //! The certificate: against the values of an independent program, and above the true error everywhere.
 
-use adapt::settings::{Estimator, Final, Strategy};
-use estimate::certificate::POINCARE;
-use estimate::{Certificate, Given, Grade, Moments, certify};
-use fem_core::scale::times_power_of_two;
+use std::sync::Arc;
 
-use crate::cases::{Grid, levels, on, solve, uniform};
+use adapt::settings::{Estimator, Mark, Strategy};
+use adapt::{Level, Problem};
+use contact::{Settings as SolveSettings, Solution, Solver, Tolerance};
+use estimate::certificate::POINCARE;
+use estimate::{Certificate, Given, Grade, Moments, TrueErrors, certify};
+use fem_core::scale::times_power_of_two;
+use fem_core::{Children, Field, FieldError, Mesh, Samples};
+
+use crate::cases::{Grid, case, levels, on, solve, uniform};
 use crate::reference::{NAMES, Reference};
 
 /// The certificate of a level.
-fn certificate(
-    problem: &adapt::Problem,
-    level: &adapt::Level,
+pub fn certificate(problem: &Problem, level: &Level, grade: Grade, poincare: f64) -> Certificate {
+    of(problem, level, &level.solution, grade, poincare)
+}
+
+/// The certificate of any pair on the mesh of a level.
+fn of(
+    problem: &Problem,
+    level: &Level,
+    solution: &Solution,
     grade: Grade,
     poincare: f64,
 ) -> Certificate {
@@ -27,53 +38,59 @@ fn certificate(
         load,
         tension,
         moments: &moments,
-        tension_mean: &level.discrete.tension_mean,
-        displacement: &level.solution.displacement,
-        force: &level.solution.force,
+        tension_mean: mean,
+        displacement: &solution.displacement,
+        force: &solution.force,
     };
     certify(&given, grade, poincare).expect("good data")
 }
 
+/// The true errors of any pair on the mesh of a level.
+fn errors(problem: &Problem, level: &Level, solution: &Solution) -> TrueErrors {
+    let exact = problem.exact.as_ref().expect("known");
+    let (mesh, discrete) = (&level.mesh, &level.discrete);
+    estimate::true_errors(mesh, discrete, solution, exact, &problem.tension).expect("finite")
+}
+
 #[test]
-fn against_the_reference() {
+fn certificate_against_the_reference() {
     for name in NAMES {
         let reference = Reference::read(name);
-        let mut level = solve(&reference.problem);
-        if std::env::var("FILE").is_ok() {
-            level.solution =
-                contact::solve(&reference.discrete(), &contact::Settings::default(), None)
-                    .expect("solved");
-        }
-        let scale = reference.problem.scale;
+        let level = solve(&reference.problem);
+        let e = reference.problem.scale.energy_norm();
         for (grade, key) in [(Grade::Rt0, "rt0_corrected"), (Grade::Rt1, "rt1_corrected")] {
-            let found = certificate(&reference.problem, &level, grade, std::f64::consts::PI);
-            let wanted = |k: &str| {
-                reference.values["totals"][key][k]
-                    .as_f64()
-                    .expect("a number")
-            };
-            let e = scale.energy_norm();
-            let relative = |found: f64, e: i32, wanted: f64| {
+            let pi = std::f64::consts::PI;
+            let found = certificate(&reference.problem, &level, grade, pi);
+            let difference = |found: f64, e: i32, k: &str| {
+                let wanted = &reference.values["totals"][key][k];
+                let wanted = wanted.as_f64().expect("a number");
                 let found = times_power_of_two(found, e);
                 if wanted == 0.0 {
                     found
                 } else {
-                    found / wanted - 1.0
+                    (found / wanted - 1.0).abs()
                 }
             };
-            println!(
-                "{name} {key}: eta {:9.1e} C {:9.1e} bound {:9.1e}; eta_alg/eta {:.1e}",
-                relative(found.eta, e, wanted("eta")),
-                relative(found.contact, 2 * e, wanted("C")),
-                relative(found.bound, e, wanted("bound")),
-                found.algebraic / found.eta,
-            );
+            let eta = difference(found.eta, e, "eta");
+            let contact = difference(found.contact, 2 * e, "C");
+            let bound = difference(found.bound, e, "bound");
+            println!("{name} {key}: eta {eta:.1e}, C {contact:.1e}, bound {bound:.1e}");
+            assert!(eta <= 1e-3 && bound <= 1e-3, "{name} {key}");
+            // C is the small product of force and gap along the free boundary, where the rule that the file's loads were integrated by is good to
+            // 1e-3 of a load that jumps, and the forces are to less (its README); on P4b they are a 1e-4 part of the load.
+            let allowed = match &name[..3] {
+                "P4b" => f64::INFINITY,
+                "P8_" => 1e-2,
+                "P1_" | "P3_" | "P4a" => 2.5e-3,
+                _ => 1e-3,
+            };
+            assert!(contact <= allowed, "{name} {key}: C {contact}");
         }
     }
 }
 
 /// Grids of every case: the domain's own, and a second family on the square.
-pub fn grids(name: &str) -> Vec<(&'static str, Grid)> {
+fn grids(name: &str) -> Vec<(&'static str, Grid)> {
     match name {
         "P1" => vec![("disk", Grid::disk(8))],
         "P3" => vec![("lshape", Grid::lshape(4))],
@@ -81,39 +98,347 @@ pub fn grids(name: &str) -> Vec<(&'static str, Grid)> {
     }
 }
 
-const CASES: [&str; 14] = [
-    "P1", "P2", "P3", "P4a", "P4b", "P4c", "P5", "P6", "P6b", "P6c", "P7", "P7c", "P7l", "P8",
+/// All cases but P6b, whose error is zero.
+const CASES: [&str; 13] = [
+    "P1", "P2", "P3", "P4a", "P4b", "P4c", "P5", "P6", "P6c", "P7", "P7c", "P7l", "P8",
 ];
 
+/// Counts runs and the extremes of bound over error.
+#[derive(Default)]
+struct Table {
+    runs: usize,
+    least: Option<f64>,
+}
+
+impl Table {
+    /// Notes one bound; it must not be below the error.
+    fn note(&mut self, what: &str, bound: f64, error: f64) -> f64 {
+        let ratio = bound / error;
+        self.runs += 1;
+        self.least = Some(self.least.map_or(ratio, |l| l.min(ratio)));
+        println!("{what}: {bound:.4e} / {error:.4e} = {ratio:.3}");
+        assert!(ratio >= 1.0, "{what}: {bound} is below the error {error}");
+        ratio
+    }
+}
+
+/// Cases, meshes and levels: the bound holds, and from 1000 vertices on it is sharp.
 #[test]
-fn effectivity_explore() {
+fn certificate_on_all_cases() {
+    let mut table = Table::default();
     for name in CASES {
         for (family, grid) in grids(name) {
-            for adaptive in [false, true] {
+            for strategy in [Strategy::Uniform, Strategy::Doerfler] {
                 let problem = on(name, &grid, usize::from(name == "P1"));
-                let mut settings = uniform(6);
+                let mut settings = uniform(5);
                 settings.estimate.estimator = Estimator::Certified;
-                settings.estimate.last = Final::Fast;
-                if adaptive {
-                    settings.mark.strategy = Strategy::Doerfler;
+                settings.estimate.also.clear();
+                settings.mark.strategy = strategy;
+                if strategy == Strategy::Doerfler {
                     settings.stop.levels = None;
-                    settings.stop.vertices = Some(6000);
+                    settings.stop.vertices = Some(2000);
                 }
                 for level in levels(&problem, &settings) {
+                    let n = level.mesh.vertex_count();
                     let error = level.estimates.errors.as_ref().expect("exact").energy;
-                    let a = level.estimates.certificate.as_ref().expect("certified");
-                    let b = certificate(&problem, &level, Grade::Rt1, POINCARE);
-                    println!(
-                        "{name:4} {family:6} {} {:6} error {error:9.3e} a {:6.3} b {:6.3} C/eta2 {:8.1e} alg/eta {:8.1e}",
-                        if adaptive { "adaptive" } else { "uniform " },
-                        level.mesh.vertex_count(),
-                        a.bound / error,
-                        b.bound / error,
-                        b.contact / b.eta.powi(2),
-                        b.algebraic / b.eta,
-                    );
+                    let what = format!("{name} {family} {strategy:?} {n}");
+                    let fast = level.estimates.certificate.as_ref().expect("wanted").bound;
+                    let sharp = certificate(&problem, &level, Grade::Rt1, POINCARE).bound;
+                    let a = table.note(&format!("{what} rt0"), fast, error);
+                    let b = table.note(&format!("{what} rt1"), sharp, error);
+                    if n >= 1000 && name != "P4c" {
+                        // The jump of the loads of P1 along a circle is not resolved at once where the grid begins with eight triangles.
+                        let allowed = match (name, strategy) {
+                            ("P1", Strategy::Doerfler) => [1.56, 1.14],
+                            ("P1", _) => [1.45, 1.10],
+                            _ => [1.40, 1.10],
+                        };
+                        assert!(a <= allowed[0] && b <= allowed[1], "{what}: {a} {b}");
+                    }
                 }
             }
         }
+    }
+    println!(
+        "{} bounds, the least {:?} times the error",
+        table.runs, table.least
+    );
+    assert!(table.runs >= 300);
+}
+
+/// Whatever solver, model and tolerance the pair comes from, and whatever is done to it afterwards.
+#[test]
+fn certificate_of_inexact_pairs() {
+    let mut table = Table::default();
+    for name in ["P1", "P2", "P3", "P4a", "P5", "P6c", "P7c", "P8"] {
+        let (family, grid) = grids(name).remove(0);
+        let problem = on(name, &grid, 2);
+        let level = solve(&problem);
+        let mut pairs: Vec<(String, Solution)> = Vec::new();
+        for (solver, tolerance, reduce) in [
+            (Solver::Clarabel, Tolerance::Balanced, true),
+            (Solver::Clarabel, Tolerance::Relative(1e-3), false),
+            (Solver::ActiveSet, Tolerance::Relative(1e-12), false),
+        ] {
+            let settings = SolveSettings {
+                solver,
+                tolerance,
+                reduce,
+                ..SolveSettings::default()
+            };
+            let pair = contact::solve(&level.discrete, &settings, None).expect("solved");
+            pairs.push((format!("{solver:?} {tolerance:?} {reduce}"), pair));
+        }
+        // Bumps on both membranes that never let them penetrate, forces that are too large or absent.
+        let base = &level.solution;
+        let largest = base.displacement[0]
+            .iter()
+            .fold(0.0f64, |m, u| m.max(u.abs()));
+        for (k, size) in [1e-8, 1e-4, 1e-2, 0.3].into_iter().enumerate() {
+            for factor in [0.0, 0.7, 1.0, 2.5] {
+                let mut pair = base.clone();
+                for j in (0..level.mesh.vertex_count()).filter(|&j| !level.mesh.boundary()[j]) {
+                    let [x, y] = level.mesh.points()[j];
+                    let bump = size * largest * ((3.0 + k as f64) * x + 2.0 * y).sin();
+                    pair.displacement[0][j] += bump + size * largest * (1.0 - y.cos());
+                    pair.displacement[1][j] += bump;
+                    pair.force[j] *= factor;
+                }
+                pairs.push((format!("bump {size:e}, force x {factor}"), pair));
+            }
+        }
+        for (what, pair) in &pairs {
+            let error = errors(&problem, &level, pair).energy;
+            for grade in [Grade::Rt0, Grade::Rt1] {
+                let found = of(&problem, &level, pair, grade, POINCARE);
+                table.note(
+                    &format!("{name} {family} {what} {grade:?}"),
+                    found.bound,
+                    error,
+                );
+                // (B1) with the parts that are told.
+                let half = 0.5 * (found.eta + found.algebraic);
+                let bound = half + (half * half + found.contact).sqrt();
+                assert!((found.bound / bound - 1.0).abs() < 1e-14);
+            }
+        }
+    }
+    println!(
+        "{} bounds, the least {:?} times the error",
+        table.runs, table.least
+    );
+    assert!(table.runs >= 300);
+}
+
+/// A case whose discrete error is zero: nothing but rounding may be left.
+#[test]
+fn certificate_of_an_exact_solution() {
+    for n in [4, 16, 64] {
+        let problem = on("P6b", &Grid::right(n), 0);
+        let level = solve(&problem);
+        for grade in [Grade::Rt0, Grade::Rt1] {
+            let found = certificate(&problem, &level, grade, POINCARE).bound;
+            let bound = times_power_of_two(found, problem.scale.energy_norm());
+            println!("P6b {n} {grade:?}: {bound:.1e}");
+            assert!(bound <= 1e-12, "{bound}");
+        }
+    }
+}
+
+/// A sum of fields with weights.
+struct Combination(Vec<(f64, Arc<dyn Field>)>);
+
+impl Field for Combination {
+    fn sample(&self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
+        out.fill(0.0);
+        let mut values = vec![0.0; out.len()];
+        for (weight, field) in &self.0 {
+            field.sample(at, &mut values)?;
+            for (o, v) in out.iter_mut().zip(&values) {
+                *o += weight * v;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn combination<const N: usize>(terms: [(f64, &Arc<dyn Field>); N]) -> Arc<dyn Field> {
+    Arc::new(Combination(terms.map(|(w, f)| (w, f.clone())).to_vec()))
+}
+
+/// The solution of a case with constant tensions, carried over to the tensions M1, M2: same action, same gap.
+fn rescaled(problem: &Problem, [large1, large2]: [f64; 2]) -> Problem {
+    let tension = [0, 1].map(|i| problem.tension[i].constant().expect("constant"));
+    let [m1, m2] = tension;
+    // In the formulas the tensions are the scaled ones, and so are M1, M2.
+    let (m, large) = (m1 + m2, large1 + large2);
+    let k = large1 * large2 / large;
+    let [f1, f2] = [&problem.load[0], &problem.load[1]];
+    let exact = problem.exact.as_ref().expect("known");
+    let action = exact.action.as_ref().expect("known");
+    // F_i = M_i a +- k b -+ lambda, a = (f1 + f2)/m, b = ((m2 f1 - m1 f2)/m + lambda) m/(m1 m2).
+    let load = |own: f64, sign: f64| {
+        let b = m / (m1 * m2);
+        combination([
+            (own / m + sign * k * b * m2 / m, f1),
+            (own / m - sign * k * b * m1 / m, f2),
+            (sign * (k * b - 1.0), action),
+        ])
+    };
+    // U_1 = S + M2 w/M, U_2 = S - M1 w/M with S = (m1 u1 + m2 u2)/m, w = u1 - u2.
+    let pair = |u1: &Arc<dyn Field>, u2: &Arc<dyn Field>| {
+        let other = [large2 / large, -large1 / large];
+        other.map(|share| combination([(m1 / m + share, u1), (m2 / m - share, u2)]))
+    };
+    let mut result = problem.clone();
+    result.tension = [large1, large2].map(|t| Arc::new(fem_core::Constant(t)) as Arc<dyn Field>);
+    result.load = [load(large1, 1.0), load(large2, -1.0)];
+    result.height = pair(&problem.height[0], &problem.height[1]);
+    let [x, y] = [0, 1].map(|c| pair(&exact.displacement[0][c], &exact.displacement[1][c]));
+    let [x1, x2] = x;
+    let [y1, y2] = y;
+    result.exact = Some(estimate::Exact {
+        displacement: [[x1, y1], [x2, y2]],
+        ..exact.clone()
+    });
+    result
+}
+
+#[test]
+fn certificate_at_all_ratios_of_the_tensions() {
+    let mut table = Table::default();
+    for name in ["P2", "P8"] {
+        for exponent in [-6, -4, -2, 0, 2, 4, 6] {
+            let ratio = 10f64.powi(exponent);
+            let problem = rescaled(&on(name, &Grid::right(8), 0), [ratio, 1.0]);
+            let mut settings = uniform(3);
+            settings.estimate.estimator = Estimator::Certified;
+            settings.estimate.also.clear();
+            for level in levels(&problem, &settings) {
+                let n = level.mesh.vertex_count();
+                let error = level.estimates.errors.as_ref().expect("exact").energy;
+                let fast = level.estimates.certificate.as_ref().expect("wanted").bound;
+                let sharp = certificate(&problem, &level, Grade::Rt1, POINCARE).bound;
+                let what = format!("{name} 1e{exponent}:1 {n}");
+                let a = table.note(&format!("{what} rt0"), fast, error);
+                let b = table.note(&format!("{what} rt1"), sharp, error);
+                assert!(n < 1000 || (a <= 1.40 && b <= 1.10), "{what}: {a} {b}");
+            }
+        }
+    }
+}
+
+/// Squares of (-1, 1)^2 with a column of width `thin` beside x = 0, so that its triangles are needles.
+fn needles(problem: &Problem, thin: f64) -> Mesh {
+    let exponent = -problem.scale.length;
+    let x: Vec<f64> = [-1.0, -0.75, -0.5, -0.25, 0.0, thin, 0.25, 0.5, 0.75, 1.0].to_vec();
+    let y: Vec<f64> = (0..9).map(|k| -1.0 + 0.25 * k as f64).collect();
+    let mut points = Vec::new();
+    for x in &x {
+        for y in &y {
+            points.push([*x, *y].map(|v| times_power_of_two(v, exponent)));
+        }
+    }
+    let rows = y.len() as u32;
+    let mut triangles = Vec::new();
+    for i in 0..x.len() as u32 - 1 {
+        for j in 0..rows - 1 {
+            let c = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| i * rows + j);
+            triangles.extend([[c[0], c[1], c[2]], [c[0], c[2], c[3]]]);
+        }
+    }
+    Mesh::new(points, &triangles, &[], None).expect("a grid")
+}
+
+#[test]
+fn certificate_on_needles() {
+    let mut table = Table::default();
+    for name in ["P2", "P5", "P8"] {
+        for exponent in [-1, -2, -4, -6, -8] {
+            // The needles' angle is about four times their width.
+            let mut problem = case(name);
+            problem.mesh = needles(&problem, 0.25 * 10f64.powi(exponent));
+            let level = solve(&problem);
+            let error = level.estimates.errors.as_ref().expect("exact").energy;
+            let what = format!("{name} angle 1e{exponent}");
+            let fast = certificate(&problem, &level, Grade::Rt0, POINCARE).bound;
+            let sharp = certificate(&problem, &level, Grade::Rt1, POINCARE).bound;
+            table.note(&format!("{what} rt0"), fast, error);
+            let b = table.note(&format!("{what} rt1"), sharp, error);
+            assert!(b <= 1.5, "{what}: {b}");
+        }
+    }
+}
+
+/// Marking by grade (a) is as good as marking by the true error: the energy error at the same number of vertices.
+#[test]
+fn certificate_marks_like_the_true_error() {
+    for (name, grid) in [
+        ("P2", Grid::right(8)),
+        ("P3", Grid::lshape(8)),
+        ("P8", Grid::right(8)),
+    ] {
+        let mark = Mark {
+            strategy: Strategy::Doerfler,
+            theta: 0.5,
+            children: Children::Four,
+        };
+        let run = |by_error: bool| -> Vec<(f64, f64)> {
+            let mut problem = on(name, &grid, 0);
+            let mut points = Vec::new();
+            let mut start = None;
+            loop {
+                let (discrete, moments) =
+                    adapt::discretise_with_moments(&problem, &problem.mesh).expect("good data");
+                let settings = SolveSettings::default();
+                let solution =
+                    contact::solve(&discrete, &settings, start.as_ref()).expect("solved");
+                let exact = problem.exact.as_ref().expect("known");
+                let mesh = &problem.mesh;
+                let errors =
+                    estimate::true_errors(mesh, &discrete, &solution, exact, &problem.tension)
+                        .expect("finite");
+                points.push((mesh.vertex_count() as f64, errors.energy));
+                if mesh.vertex_count() > 10_000 {
+                    return points;
+                }
+                let squares = if by_error {
+                    errors.energy_squared
+                } else {
+                    let given = Given {
+                        mesh,
+                        load: [&*problem.load[0], &*problem.load[1]],
+                        tension: [&*problem.tension[0], &*problem.tension[1]],
+                        moments: &moments,
+                        tension_mean: &discrete.tension_mean,
+                        displacement: &solution.displacement,
+                        force: &solution.force,
+                    };
+                    let found = certify(&given, Grade::Rt0, POINCARE).expect("good data");
+                    found.local.iter().map(|l| l * l).collect()
+                };
+                let marked = adapt::mark(&squares, &mark);
+                let old = problem
+                    .mesh
+                    .refine(&marked, mark.children)
+                    .expect("refines");
+                start = Some(contact::Start::prolong(
+                    &solution,
+                    &problem.mesh,
+                    old.old_vertices,
+                ));
+            }
+        };
+        // Both runs at 10 000 vertices, between the last two levels on the logarithmic scale.
+        let at = |points: &[(f64, f64)]| {
+            let [.., (n0, e0), (n1, e1)] = points else {
+                panic!("two levels")
+            };
+            let s = (10_000f64 / n0).ln() / (n1 / n0).ln();
+            (e0.ln() + s * (e1 / e0).ln()).exp()
+        };
+        let (certified, best) = (at(&run(false)), at(&run(true)));
+        println!("{name}: {certified:.5e} by the certificate, {best:.5e} by the true error");
+        assert!(certified <= 1.02 * best, "{name}: {}", certified / best);
     }
 }

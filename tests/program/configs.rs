@@ -113,8 +113,7 @@ fn scenes_with_known_solutions() {
         let certificate = &summary["certificate"];
         assert_eq!(certificate["bound"], summary["error_bound"], "{name}");
         assert_eq!(
-            certificate["guaranteed"],
-            known.guaranteed,
+            certificate["guaranteed"], known.guaranteed,
             "{name}: {certificate}"
         );
         assert!(number(&run, "kkt_residual") <= 1e-12, "{name}");
