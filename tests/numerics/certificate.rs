@@ -31,7 +31,7 @@ fn of(
     let mean = &level.discrete.tension_mean;
     let moments = match &level.moments {
         Some(moments) => moments.clone(),
-        None => Moments::of(&level.mesh, load, tension, mean).expect("good data"),
+        None => Moments::of(&level.mesh, load, tension).expect("good data"),
     };
     let given = Given {
         mesh: &level.mesh,

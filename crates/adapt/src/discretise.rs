@@ -47,7 +47,7 @@ pub enum DataError {
 /// [`DataError`] where data are not finite, a tension is not positive, or g1 < g2.
 pub fn discretise(problem: &Problem, mesh: &Mesh) -> Result<DiscreteProblem, DataError> {
     let loads = || load_pair(mesh, [&*problem.load[0], &*problem.load[1]]);
-    let (discrete, ()) = assemble(problem, mesh, |_| Ok((loads()?, ())))?;
+    let (discrete, ()) = assemble(problem, mesh, || Ok((loads()?, ())))?;
     Ok(discrete)
 }
 
@@ -59,10 +59,10 @@ pub fn discretise_with_moments(
     problem: &Problem,
     mesh: &Mesh,
 ) -> Result<(DiscreteProblem, Moments), DataError> {
-    assemble(problem, mesh, |tension_mean| {
+    assemble(problem, mesh, || {
         let load = [&*problem.load[0], &*problem.load[1]];
         let tension = [&*problem.tension[0], &*problem.tension[1]];
-        let moments = Moments::of(mesh, load, tension, tension_mean)?;
+        let moments = Moments::of(mesh, load, tension)?;
         Ok((moments.loads(mesh), moments))
     })
 }
@@ -70,7 +70,7 @@ pub fn discretise_with_moments(
 fn assemble<T>(
     problem: &Problem,
     mesh: &Mesh,
-    loads: impl FnOnce(&[Vec<f64>; 2]) -> Result<([Loads; 2], T), FieldError>,
+    loads: impl FnOnce() -> Result<([Loads; 2], T), FieldError>,
 ) -> Result<(DiscreteProblem, T), DataError> {
     let physical = |v: f64| fem_core::scale::times_power_of_two(v, problem.scale.length);
     let tension = [
@@ -96,7 +96,7 @@ fn assemble<T>(
         let excess = fem_core::scale::times_power_of_two(excess, problem.scale.displacement());
         return Err(DataError::Heights { x, y, excess });
     }
-    let (loads, rest) = loads(&tension)?;
+    let (loads, rest) = loads()?;
     Ok((DiscreteProblem::new(mesh, tension, loads, heights), rest))
 }
 

@@ -92,6 +92,28 @@ pub(super) struct Norms {
     pub remainder: [f64; 2],
 }
 
+impl Norms {
+    /// The closed forms; of the remainder only where the data are constant in the element.
+    #[inline]
+    pub fn uniform(
+        given: &Given<'_>,
+        shares: &Shares,
+        squares: &[[f64; 2]],
+        fluxes: &dyn Reconstruction,
+        t: usize,
+        area: f64,
+    ) -> Norms {
+        let mut norms = Norms::default();
+        for i in 0..2 {
+            norms.misfit[i] = squares[t][i] / given.tension_mean[i][t];
+            if given.moments.uniform(t) {
+                norms.remainder[i] = fluxes.uniform_remainder(t, i, area, shares);
+            }
+        }
+        norms
+    }
+}
+
 /// Accuracy of the integrals along jumps: a cut piece may be wrong by this part of the whole.
 const CONTROL: Control = Control {
     tolerance: 1e-6,
@@ -103,7 +125,7 @@ const CONTROL: Control = Control {
 /// Accuracy of the integrals elsewhere: a piece may be wrong by this part of what its element contributes.
 const LOCAL_TOLERANCE: f64 = 1e-3;
 
-/// Evaluates the norms: in closed form where the data are constant in an element, else by quadrature.
+/// Evaluates the norms where data vary: in closed form where the data are constant in an element, else by quadrature.
 ///
 /// `squares` holds ||tau||^2 for every element and membrane. Where the tensions are constants and the loads smooth, seven samples of an element do;
 /// else its six parts are sampled.
@@ -111,23 +133,15 @@ pub(super) fn norms(
     given: &Given<'_>,
     moments: &Moments,
     shares: &Shares,
-    flux: &[Vec<[f64; 2]>; 2],
+    flux: &[[[f64; 2]; 2]],
     squares: &[[f64; 2]],
     fluxes: &dyn Reconstruction,
 ) -> Result<Vec<Norms>, FieldError> {
     let mesh = given.mesh;
-    let mut norms = vec![Norms::default(); mesh.triangle_count()];
-    for (t, (id, norms)) in mesh.triangle_ids().zip(&mut norms).enumerate() {
+    let mut norms = Vec::with_capacity(mesh.triangle_count());
+    for (t, id) in mesh.triangle_ids().enumerate() {
         let area = mesh.shape(id).area;
-        for i in 0..2 {
-            norms.misfit[i] = squares[t][i] / given.tension_mean[i][t];
-            if moments.uniform[t] {
-                norms.remainder[i] = fluxes.uniform_remainder(t, i, area, shares);
-            }
-        }
-    }
-    if moments.uniform.iter().all(|u| *u) {
-        return Ok(norms);
+        norms.push(Norms::uniform(given, shares, squares, fluxes, t, area));
     }
     let varying = given.tension.map(|f| f.constant().is_none());
     let exact = norms.clone();
@@ -154,7 +168,7 @@ struct Sampled<'a> {
     given: &'a Given<'a>,
     moments: &'a Moments,
     shares: &'a Shares,
-    flux: &'a [Vec<[f64; 2]>; 2],
+    flux: &'a [[[f64; 2]; 2]],
     fluxes: &'a dyn Reconstruction,
     /// Which tensions vary.
     varying: [bool; 2],
@@ -227,7 +241,7 @@ impl Sampled<'_> {
     fn misfit(&self, piece: &Piece<'_>, i: usize) -> [[f64; POINTS]; 2] {
         let t = piece.triangle;
         let mean = self.given.tension_mean[i][t];
-        let q = self.flux[i][t];
+        let q = self.flux[t][i];
         let mut out = [[0.0; POINTS]; 2];
         let taus = self.fluxes.tau(t, i, piece.part, piece.at);
         for (k, tau) in taus.iter().enumerate() {
@@ -243,7 +257,7 @@ impl Sampled<'_> {
     /// Weight of the remainder beside the misfit: C_K^2/mu_i.
     fn weight(&self, t: usize, i: usize) -> f64 {
         let shape = self.given.mesh.shape(TriangleId(t as u32));
-        (shape.diameter() / POINCARE).powi(2) / self.moments.stiffness_low[i][t]
+        (shape.diameter() / POINCARE).powi(2) / self.moments.stiffness_low[i].at(t)
     }
 
     /// What the closed form of the misfit says of a piece.
@@ -316,7 +330,7 @@ impl Integrand for Sampled<'_> {
     }
 
     fn skips(&self, triangle: usize) -> bool {
-        self.varying == [false; 2] && self.moments.uniform[triangle]
+        self.varying == [false; 2] && self.moments.uniform(triangle)
     }
 
     fn sample(&mut self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
@@ -345,7 +359,7 @@ impl Integrand for Sampled<'_> {
     fn judge(&self, piece: &Piece<'_>) -> Judgement {
         let t = piece.triangle;
         let (mut magnitude, mut error) = (self.share_of_misfit(piece), 0.0);
-        if !self.moments.uniform[t] {
+        if !self.moments.uniform(t) {
             for i in 0..2 {
                 let (square, wrong) = self.judged_remainder(piece, i);
                 let weight = self.weight(t, i);
@@ -370,7 +384,7 @@ impl Integrand for Sampled<'_> {
 
     fn clear(&mut self, t: usize) {
         let norms = &mut self.norms[t];
-        if !self.moments.uniform[t] {
+        if !self.moments.uniform(t) {
             norms.remainder = [0.0; 2];
         }
         for i in (0..2).filter(|&i| self.varying[i]) {
@@ -381,7 +395,7 @@ impl Integrand for Sampled<'_> {
     fn add(&mut self, piece: &Piece<'_>) {
         let t = piece.triangle;
         for i in 0..2 {
-            if !self.moments.uniform[t] {
+            if !self.moments.uniform(t) {
                 self.norms[t].remainder[i] += self.judged_remainder(piece, i).0;
             }
             if self.varying[i] {

@@ -26,10 +26,8 @@ mod shares;
 
 use fem_core::{Field, FieldError, Mesh};
 
-use crate::gradients::gradients;
 pub use boundary::{BoundaryOscillation, boundary_oscillation};
-use misfit::{Norms, norms};
-use moments::product;
+use misfit::{Norms, Reconstruction, norms};
 pub use moments::{JUMP, Moments};
 use shares::Shares;
 
@@ -99,46 +97,54 @@ pub struct Certificate {
 pub fn certify(given: &Given<'_>, grade: Grade, poincare: f64) -> Result<Certificate, FieldError> {
     let mesh = given.mesh;
     let moments = given.moments;
-    let flux = [0, 1].map(|i| {
-        let mut flux = gradients(mesh, &given.displacement[i]);
-        for (q, mu) in flux.iter_mut().zip(&given.tension_mean[i]) {
-            *q = [mu * q[0], mu * q[1]];
-        }
-        flux
-    });
-    let shares = Shares::of(given, moments, &flux);
-    let norms = match grade {
+    let (shares, flux) = Shares::of(given);
+    match grade {
         Grade::Rt0 => {
             let (fluxes, squares) = rt0::equilibrate(mesh, moments, &shares, &flux);
-            norms(given, moments, &shares, &flux, &squares, &fluxes)?
+            summed(given, grade, poincare, &shares, &flux, &squares, &fluxes)
         }
         Grade::Rt1 => {
             let (fluxes, squares) = rt1::equilibrate(mesh, moments, &shares, &flux);
-            norms(given, moments, &shares, &flux, &squares, &fluxes)?
+            summed(given, grade, poincare, &shares, &flux, &squares, &fluxes)
         }
+    }
+}
+
+/// Norms and sums over the elements.
+fn summed(
+    given: &Given<'_>,
+    grade: Grade,
+    poincare: f64,
+    shares: &Shares,
+    flux: &[[[f64; 2]; 2]],
+    squares: &[[f64; 2]],
+    fluxes: &dyn Reconstruction,
+) -> Result<Certificate, FieldError> {
+    let (mesh, moments) = (given.mesh, given.moments);
+    let norms = match moments.all_uniform() {
+        true => None,
+        false => Some(norms(given, moments, shares, flux, squares, fluxes)?),
     };
     let mut local = Vec::with_capacity(mesh.triangle_count());
     let (mut square, mut contact) = (0.0, 0.0);
     for (t, id) in mesh.triangle_ids().enumerate() {
         let shape = mesh.shape(id);
         let constant = shape.diameter() / poincare;
-        let Norms { misfit, remainder } = norms[t];
+        let Norms { misfit, remainder } = match &norms {
+            Some(norms) => norms[t],
+            None => Norms::uniform(given, shares, squares, fluxes, t, shape.area),
+        };
         let mut own = 0.0;
         for i in 0..2 {
-            let low = moments.stiffness_low[i][t];
+            let low = moments.stiffness_low[i].at(t);
             own += (misfit[i].sqrt() + constant * (remainder[i] / low).sqrt()).powi(2);
         }
-        let overlap = contact_term(given, moments, &shares, t, shape.area);
+        let overlap = contact_term(given, moments, shares, t, shape.area);
         square += own;
         contact += overlap;
         local.push((own + overlap).sqrt());
     }
-    let low = [0, 1].map(|i| {
-        moments.stiffness_low[i]
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min)
-    });
+    let low = [0, 1].map(|i| moments.stiffness_low[i].least());
     let eta = square.sqrt();
     let algebraic = shares.algebraic(mesh, low);
     let half = 0.5 * (eta + algebraic);
@@ -166,7 +172,7 @@ fn contact_term(given: &Given<'_>, moments: &Moments, shares: &Shares, t: usize,
         let (theta, kappa) = (shares.theta[v[k]], shares.kappa[v[k]]);
         if theta > 0.0 {
             let part: f64 = (0..3)
-                .map(|l| moments.action[t][product(k, l)] * gap[l])
+                .map(|l| moments.action.product(t, area, k, l) * gap[l])
                 .sum();
             sum += theta * part;
         }

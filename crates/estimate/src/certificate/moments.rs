@@ -19,27 +19,94 @@ pub(super) fn product(k: usize, l: usize) -> usize {
     if k == l { k } else { 6 - k - l }
 }
 
-/// (g, phi_k) from the products.
-#[inline]
-pub(super) fn against_hat(products: &Products, k: usize) -> f64 {
-    products[product(k, 0)] + products[product(k, 1)] + products[product(k, 2)]
+/// Moments of one function in every element.
+#[derive(Clone, Debug)]
+pub(super) enum Integrals {
+    /// Those of a constant.
+    Constant(f64),
+    /// Those of anything else.
+    Each(Vec<Products>),
 }
 
-/// What is known of the data in every element; scaled.
+impl Integrals {
+    /// (g, phi_k phi_l) over element `t` of this area; |K|/6 times a constant if k = l, |K|/12 if not.
+    #[inline]
+    pub fn product(&self, t: usize, area: f64, k: usize, l: usize) -> f64 {
+        match self {
+            Integrals::Constant(value) => value * area / if k == l { 6.0 } else { 12.0 },
+            Integrals::Each(all) => all[t][product(k, l)],
+        }
+    }
+
+    /// (g, phi_k) over element `t` of this area.
+    #[inline]
+    pub fn hat(&self, t: usize, area: f64, k: usize) -> f64 {
+        match self {
+            Integrals::Constant(value) => value * area / 3.0,
+            Integrals::Each(all) => {
+                let p = &all[t];
+                p[product(k, 0)] + p[product(k, 1)] + p[product(k, 2)]
+            }
+        }
+    }
+
+    fn each(&mut self) -> &mut [Products] {
+        match self {
+            Integrals::Constant(_) => &mut [],
+            Integrals::Each(all) => all,
+        }
+    }
+}
+
+/// A value for every element.
+#[derive(Clone, Debug)]
+pub(super) enum Values {
+    /// The same everywhere.
+    Constant(f64),
+    /// One each.
+    Each(Vec<f64>),
+}
+
+impl Values {
+    #[inline]
+    pub fn at(&self, t: usize) -> f64 {
+        match self {
+            Values::Constant(value) => *value,
+            Values::Each(all) => all[t],
+        }
+    }
+
+    /// The least value.
+    pub fn least(&self) -> f64 {
+        match self {
+            Values::Constant(value) => *value,
+            Values::Each(all) => all.iter().copied().fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    fn each(&mut self) -> &mut [f64] {
+        match self {
+            Values::Constant(_) => &mut [],
+            Values::Each(all) => all,
+        }
+    }
+}
+
+/// What is known of the data in every element; scaled. Nothing is stored of constants.
 #[derive(Clone, Debug)]
 pub struct Moments {
     /// Of f_1 and f_2.
-    pub(super) load: [Vec<Products>; 2],
+    pub(super) load: [Integrals; 2],
     /// Of lambda*.
-    pub(super) action: Vec<Products>,
-    /// Whether all samples of loads and tensions in the element are equal.
-    pub(super) uniform: Vec<bool>,
+    pub(super) action: Integrals,
     /// Mean of 1/mu_i.
-    pub(super) softness: [Vec<f64>; 2],
+    pub(super) softness: [Values; 2],
     /// A lower bound for mu_i, from its samples and their trend towards the corners.
-    pub(super) stiffness_low: [Vec<f64>; 2],
+    pub(super) stiffness_low: [Values; 2],
     /// Number of elements in which the samples of a tension differ by more than a factor [`JUMP`].
     pub(super) jumps: usize,
+    /// Whether all samples of loads and tensions in the element are equal; empty where all data are constants.
+    varied: Vec<bool>,
     /// A value of f_i in the element, and the first two moments of f_i minus that value.
     spread: [Vec<[f64; 3]>; 2],
 }
@@ -59,52 +126,42 @@ pub(super) fn contact_action(tension: [f64; 2], load: [f64; 2]) -> f64 {
 impl Moments {
     /// Integrates over all elements; O(N), and no samples where all data are constants.
     ///
-    /// `tension_mean` holds the means of the tensions over the elements.
-    ///
     /// # Errors
     /// A value of a load or a tension that is not finite.
     pub fn of(
         mesh: &Mesh,
         load: [&dyn Field; 2],
         tension: [&dyn Field; 2],
-        tension_mean: &[Vec<f64>; 2],
     ) -> Result<Moments, FieldError> {
         let count = mesh.triangle_count();
         let constants = [load[0], load[1], tension[0], tension[1]].map(|f| f.constant());
-        let inverse = |mean: &Vec<f64>| mean.iter().map(|m| 1.0 / m).collect::<Vec<_>>();
-        let mut result = Moments {
-            load: [Vec::new(), Vec::new()],
-            action: Vec::new(),
-            uniform: vec![true; count],
-            softness: [inverse(&tension_mean[0]), inverse(&tension_mean[1])],
-            stiffness_low: tension_mean.clone(),
-            jumps: 0,
-            spread: [Vec::new(), Vec::new()],
-        };
         if let [Some(f1), Some(f2), Some(m1), Some(m2)] = constants {
-            let action = contact_action([m1, m2], [f1, f2]);
-            let products = |value: f64| -> Vec<Products> {
-                mesh.triangle_ids()
-                    .map(|id| constant_products(mesh.shape(id).area, value))
-                    .collect()
-            };
-            result.load = [products(f1), products(f2)];
-            result.action = products(action);
-            result.spread = [f1, f2].map(|f| vec![[f, 0.0, 0.0]; count]);
-            return Ok(result);
+            return Ok(Moments {
+                load: [f1, f2].map(Integrals::Constant),
+                action: Integrals::Constant(contact_action([m1, m2], [f1, f2])),
+                softness: [m1, m2].map(|m| Values::Constant(1.0 / m)),
+                stiffness_low: [m1, m2].map(Values::Constant),
+                jumps: 0,
+                varied: Vec::new(),
+                spread: [Vec::new(), Vec::new()],
+            });
         }
-        result.load = [vec![[0.0; 6]; count], vec![[0.0; 6]; count]];
-        result.action = vec![[0.0; 6]; count];
-        result.spread = [vec![[0.0; 3]; count], vec![[0.0; 3]; count]];
-        let varying = [tension[0], tension[1]].map(|f| f.constant().is_none());
-        let mut range = [Vec::new(), Vec::new()];
-        for i in 0..2 {
-            if varying[i] {
-                result.softness[i] = vec![0.0; count];
-                result.stiffness_low[i] = vec![f64::INFINITY; count];
-                range[i] = vec![NOTHING; count];
-            }
-        }
+        let zeros = || Integrals::Each(vec![[0.0; 6]; count]);
+        let per_element = |i: usize, of: fn(f64) -> f64, begin: f64| match constants[2 + i] {
+            Some(value) => Values::Constant(of(value)),
+            None => Values::Each(vec![begin; count]),
+        };
+        let varying = [0, 1].map(|i| constants[2 + i].is_none());
+        let result = Moments {
+            load: [zeros(), zeros()],
+            action: zeros(),
+            softness: [0, 1].map(|i| per_element(i, |m| 1.0 / m, 0.0)),
+            stiffness_low: [0, 1].map(|i| per_element(i, |m| m, f64::INFINITY)),
+            jumps: 0,
+            varied: vec![false; count],
+            spread: [vec![[0.0; 3]; count], vec![[0.0; 3]; count]],
+        };
+        let range = varying.map(|v| vec![NOTHING; if v { count } else { 0 }]);
         let mut integrand = Sums {
             fields: [load[0], load[1], tension[0], tension[1]],
             varying,
@@ -119,13 +176,24 @@ impl Moments {
         let mut jump = vec![false; count];
         for i in (0..2).filter(|&i| varying[i]) {
             for t in 0..count {
-                moments.softness[i][t] /= mesh.shape(fem_core::TriangleId(t as u32)).area;
+                moments.softness[i].each()[t] /= mesh.shape(fem_core::TriangleId(t as u32)).area;
                 let [least, largest] = range[i][t];
                 jump[t] |= largest > JUMP * least;
             }
         }
         moments.jumps = jump.iter().filter(|j| **j).count();
         Ok(moments)
+    }
+
+    /// Whether all data are constant in an element.
+    #[inline]
+    pub(super) fn uniform(&self, t: usize) -> bool {
+        self.varied.is_empty() || !self.varied[t]
+    }
+
+    /// Whether all data are constant in every element.
+    pub(super) fn all_uniform(&self) -> bool {
+        !self.varied.contains(&true)
     }
 
     /// The load vectors, means and deviations, as [`fem_core::integrate::load_pair`] finds them.
@@ -137,11 +205,14 @@ impl Moments {
                 deviation_squared: Vec::with_capacity(mesh.triangle_count()),
             };
             for (t, id) in mesh.triangle_ids().enumerate() {
-                for (k, v) in mesh.triangles()[t].iter().enumerate() {
-                    loads.nodal[v.index()] += against_hat(&self.load[i][t], k);
-                }
                 let area = mesh.shape(id).area;
-                let [base, first, second] = self.spread[i][t];
+                for (k, v) in mesh.triangles()[t].iter().enumerate() {
+                    loads.nodal[v.index()] += self.load[i].hat(t, area, k);
+                }
+                let [base, first, second] = match &self.load[i] {
+                    Integrals::Constant(value) => [*value, 0.0, 0.0],
+                    Integrals::Each(_) => self.spread[i][t],
+                };
                 loads.mean.push(base + first / area);
                 loads
                     .deviation_squared
@@ -150,14 +221,6 @@ impl Moments {
             loads
         })
     }
-}
-
-/// Products of the hat functions times a constant: |K|/6 on the diagonal, |K|/12 beside it.
-#[inline]
-fn constant_products(area: f64, value: f64) -> Products {
-    let twelfth = value * area / 12.0;
-    let sixth = 2.0 * twelfth;
-    [sixth, sixth, sixth, twelfth, twelfth, twelfth]
 }
 
 /// The integrals under way.
@@ -198,16 +261,16 @@ impl Integrand for Sums<'_> {
 
     fn clear(&mut self, t: usize) {
         let moments = &mut self.moments;
-        moments.load[0][t] = [0.0; 6];
-        moments.load[1][t] = [0.0; 6];
-        moments.action[t] = [0.0; 6];
-        moments.uniform[t] = true;
+        moments.load[0].each()[t] = [0.0; 6];
+        moments.load[1].each()[t] = [0.0; 6];
+        moments.action.each()[t] = [0.0; 6];
+        moments.varied[t] = false;
         moments.spread[0][t] = [0.0; 3];
         moments.spread[1][t] = [0.0; 3];
         self.first[t] = None;
         for i in (0..2).filter(|&i| self.varying[i]) {
-            moments.softness[i][t] = 0.0;
-            moments.stiffness_low[i][t] = f64::INFINITY;
+            moments.softness[i].each()[t] = 0.0;
+            moments.stiffness_low[i].each()[t] = f64::INFINITY;
             self.range[i][t] = NOTHING;
         }
     }
@@ -219,7 +282,7 @@ impl Integrand for Sums<'_> {
         let moments = &mut self.moments;
         for (k, (point, at)) in piece.rule.iter().zip(piece.at).enumerate() {
             let sample = [0, 1, 2, 3].map(|c| values[c][k]);
-            moments.uniform[t] &= sample == first;
+            moments.varied[t] |= sample != first;
             let weight = point.weight * piece.area;
             let [f1, f2, m1, m2] = sample;
             let action = contact_action([m1, m2], [f1, f2]);
@@ -238,22 +301,22 @@ impl Integrand for Sums<'_> {
                 at[2] * at[0],
                 at[0] * at[1],
             ];
-            for (p, shape) in shapes.iter().enumerate() {
-                let w = weight * shape;
-                moments.load[0][t][p] += w * f1;
-                moments.load[1][t][p] += w * f2;
-                moments.action[t][p] += w * action;
+            let [first, second] = &mut moments.load;
+            for (integrals, value) in [(first, f1), (second, f2), (&mut moments.action, action)] {
+                for (sum, shape) in integrals.each()[t].iter_mut().zip(&shapes) {
+                    *sum += weight * shape * value;
+                }
             }
             for (i, mu) in [(0, m1), (1, m2)] {
                 if self.varying[i] {
-                    moments.softness[i][t] += weight / mu;
+                    moments.softness[i].each()[t] += weight / mu;
                     let [least, largest] = &mut self.range[i][t];
                     (*least, *largest) = (least.min(mu), largest.max(mu));
                 }
             }
         }
         for i in (0..2).filter(|&i| self.varying[i]) {
-            let low = &mut moments.stiffness_low[i][t];
+            let low = &mut moments.stiffness_low[i].each()[t];
             *low = low.min(lowest(piece, values[2 + i]));
         }
     }

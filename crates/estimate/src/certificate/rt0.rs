@@ -16,9 +16,10 @@ use super::misfit::{Frame, Reconstruction};
 use super::moments::Moments;
 use super::shares::{SIGN, Shares};
 
-/// Fluxes of tau through the first spoke of every corner, and half what the corner adds to them.
+/// Fluxes of tau and what balances the data; nothing is kept where all data are constant.
 pub(super) struct Fluxes<'a> {
     mesh: &'a Mesh,
+    moments: &'a Moments,
     /// `[alpha, h]` for both membranes: alpha enters the corner's part of the dual cell counter-clockwise through the half edge to the
     /// next corner, alpha + h passes the median and alpha + 2h leaves. h is the divergence times |K|/6.
     spokes: Vec<[[[f64; 2]; 2]; 3]>,
@@ -76,22 +77,27 @@ impl Form {
 /// Returns the fluxes and ||tau||^2_K for every element and membrane, without the weight 1/mu.
 pub(super) fn equilibrate<'a>(
     mesh: &'a Mesh,
-    moments: &Moments,
+    moments: &'a Moments,
     shares: &Shares,
-    flux: &[Vec<[f64; 2]>; 2],
+    flux: &[[[f64; 2]; 2]],
 ) -> (Fluxes<'a>, Vec<[f64; 2]>) {
     let count = mesh.triangle_count();
-    let mut spokes = vec![[[[0.0; 2]; 2]; 3]; count];
-    let mut balance = vec![[[0.0; 2]; 3]; count];
+    let kept = if moments.all_uniform() { 0 } else { count };
+    let mut fluxes = Fluxes {
+        mesh,
+        moments,
+        spokes: vec![[[[0.0; 2]; 2]; 3]; kept],
+        balance: vec![[[0.0; 2]; 3]; kept],
+    };
     let mut squares = vec![[0.0; 2]; count];
     let mut fan = Fan::default();
-    let mut forms: Vec<Form> = Vec::new();
+    let mut links: Vec<Link> = Vec::new();
     for first in beginnings(mesh) {
         fan.walk(mesh, first);
         let j = mesh.triangles()[first.index()][first.corner()].index();
         let cell = [shares.cell(0, j), shares.cell(1, j)];
         let theta = shares.theta[j];
-        forms.clear();
+        links.clear();
         // Entering flux relative to the first spoke, and the sums for the free constant.
         let mut alpha = [0.0f64; 2];
         let mut slope = [0.0f64; 2];
@@ -105,55 +111,64 @@ pub(super) fn equilibrate<'a>(
                 let normal = frame.first_normal;
                 let last = previous.index();
                 for i in 0..2 {
-                    let (p, q) = (flux[i][last], flux[i][t]);
+                    let (p, q) = (flux[last][i], flux[t][i]);
                     alpha[i] += 0.5 * ((q[0] - p[0]) * normal[0] + (q[1] - p[1]) * normal[1]);
                 }
             }
             let form = Form::of(&frame.products);
             let area = frame.products.area;
+            let action = theta * moments.action.hat(t, area, k);
+            let mut link = Link {
+                form,
+                flux: [[0.0; 2]; 2],
+            };
             for i in 0..2 {
-                let balanced = 3.0 / area
-                    * (super::moments::against_hat(&moments.load[i][t], k)
-                        + SIGN[i] * theta * super::moments::against_hat(&moments.action[t], k));
+                let balanced = 3.0 / area * (moments.load[i].hat(t, area, k) + SIGN[i] * action);
                 let h = (balanced + cell[i]) * area / 6.0;
-                let w = moments.softness[i][t];
+                let w = moments.softness[i].at(t);
                 slope[i] += w * (2.0 * alpha[i] * form.a + h * form.b);
                 weight[i] += w * form.a;
-                spokes[t][k][i] = [alpha[i], h];
-                balance[t][k][i] = balanced;
+                link.flux[i] = [alpha[i], h];
+                if kept > 0 {
+                    fluxes.balance[t][k][i] = balanced;
+                }
                 alpha[i] += 2.0 * h;
             }
-            forms.push(form);
+            links.push(link);
             before = Some(corner);
         }
         let shift = [0, 1].map(|i| -0.5 * slope[i] / weight[i]);
-        for (corner, form) in fan.corners.iter().zip(&forms) {
-            let (t, k) = (corner.index(), corner.corner());
+        for (corner, link) in fan.corners.iter().zip(&mut links) {
+            let t = corner.index();
             for i in 0..2 {
-                let [alpha, h] = &mut spokes[t][k][i];
+                let [alpha, h] = &mut link.flux[i];
                 *alpha += shift[i];
-                squares[t][i] += form.energy(*alpha, *h);
+                squares[t][i] += link.form.energy(*alpha, *h);
+            }
+            if kept > 0 {
+                fluxes.spokes[t][corner.corner()] = link.flux;
             }
         }
     }
-    (
-        Fluxes {
-            mesh,
-            spokes,
-            balance,
-        },
-        squares,
-    )
+    (fluxes, squares)
+}
+
+/// One triangle around a vertex.
+struct Link {
+    form: Form,
+    /// `[alpha, h]` for both membranes.
+    flux: [[f64; 2]; 2],
 }
 
 /// Share of |K| in ||sum_k P_k (phi_k - chi_Dk)||^2 = 5/108 |K| sum over pairs of (P_k - P_l)^2.
 const UNIFORM: f64 = 5.0 / 108.0;
 
 impl Reconstruction for Fluxes<'_> {
-    fn uniform_remainder(&self, triangle: usize, membrane: usize, area: f64, _: &Shares) -> f64 {
-        // For constant data lambda* and f_i the balance at corner k is f_i +- theta_k lambda*, whose interpolant meets the data.
-        let p = self.balance[triangle].map(|b| b[membrane]);
-        UNIFORM * area * super::misfit::pairs(p)
+    fn uniform_remainder(&self, t: usize, _: usize, area: f64, shares: &Shares) -> f64 {
+        // The balance at corner k is f_i +- theta_k lambda*, whose interpolant meets the data.
+        let action = 3.0 * self.moments.action.hat(t, area, 0) / area;
+        let theta = self.mesh.triangles()[t].map(|j| shares.theta[j.index()]);
+        UNIFORM * area * action * action * super::misfit::pairs(theta)
     }
 
     fn lacks_cells(&self) -> bool {

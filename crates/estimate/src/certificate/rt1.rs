@@ -20,7 +20,7 @@ use fem_core::quadrature::POINTS;
 
 use super::fan::{Corner, Fan, beginnings};
 use super::misfit::{CornerFrame, Frame, Reconstruction, pairs};
-use super::moments::{Moments, product};
+use super::moments::{Moments, Values};
 use super::ring::Ring;
 use super::shares::{SIGN, Shares};
 
@@ -184,7 +184,7 @@ pub(super) fn equilibrate<'a>(
     mesh: &'a Mesh,
     moments: &Moments,
     shares: &Shares,
-    flux: &[Vec<[f64; 2]>; 2],
+    flux: &[[[f64; 2]; 2]],
 ) -> (Fluxes<'a>, Vec<[f64; 2]>) {
     let count = mesh.triangle_count();
     let gram = Gram::new();
@@ -203,14 +203,7 @@ pub(super) fn equilibrate<'a>(
                 .map(|&corner| Link::new(mesh, moments, shares, &forms, corner)),
         );
         for i in 0..2 {
-            solve(
-                &fan,
-                &mut links,
-                i,
-                &flux[i],
-                &moments.softness[i],
-                &mut ring,
-            );
+            solve(&fan, &mut links, i, flux, &moments.softness[i], &mut ring);
             for link in &links {
                 let (t, k) = (link.corner.index(), link.corner.corner());
                 let [enters, first, second] = link.found;
@@ -277,9 +270,10 @@ impl Link {
             let own = shares.cell(i, j);
             let mut result = [0.0; 3];
             for l in 0..3 {
-                let p = product(k, (k + l) % 3);
-                result[l] =
-                    data.load[i][t][p] + SIGN[i] * theta * data.action[t][p] + own * cell[l];
+                let m = (k + l) % 3;
+                result[l] = data.load[i].product(t, area, k, m)
+                    + SIGN[i] * theta * data.action.product(t, area, k, m)
+                    + own * cell[l];
             }
             result
         });
@@ -305,15 +299,15 @@ fn solve(
     fan: &Fan,
     links: &mut [Link],
     membrane: usize,
-    flux: &[[f64; 2]],
-    softness: &[f64],
+    flux: &[[[f64; 2]; 2]],
+    softness: &Values,
     ring: &mut Ring,
 ) {
     let n = links.len();
     let jump = |links: &[Link], from: usize, to: usize| {
         let (p, q) = (
-            flux[links[from].corner.index()],
-            flux[links[to].corner.index()],
+            flux[links[from].corner.index()][membrane],
+            flux[links[to].corner.index()][membrane],
         );
         let normal = links[to].frame.first_normal;
         (q[0] - p[0]) * normal[0] + (q[1] - p[1]) * normal[1]
@@ -334,7 +328,7 @@ fn solve(
     let spokes = if fan.closed { n } else { n + 1 };
     ring.begin(spokes);
     for (k, link) in links.iter().enumerate() {
-        let w = softness[link.corner.index()];
+        let w = softness.at(link.corner.index());
         let next = (k + 1) % spokes;
         let gradient = link
             .form

@@ -4,10 +4,8 @@
 //! cell. That is nonnegative, and cancels against the loads before anything is divided by a soft tension.
 
 use fem_core::Mesh;
-use fem_core::assemble::dual_areas;
 
 use super::Given;
-use super::moments::{Moments, against_hat};
 use crate::action::extend_to_boundary;
 
 /// A remainder below this part of the force is rounding.
@@ -26,24 +24,33 @@ pub(super) struct Shares {
 }
 
 impl Shares {
-    /// Divides the forces and evaluates the residuals; O(N).
-    pub fn of(given: &Given<'_>, moments: &Moments, flux: &[Vec<[f64; 2]>; 2]) -> Shares {
-        let mesh = given.mesh;
+    /// Divides the forces and evaluates the residuals; O(N). Returns the fluxes mu_iK grad u_ih of every element too.
+    pub fn of(given: &Given<'_>) -> (Shares, Vec<[[f64; 2]; 2]>) {
+        let (mesh, moments) = (given.mesh, given.moments);
         let count = mesh.vertex_count();
-        let area = dual_areas(mesh);
+        let mut area = vec![0.0; count];
+        let mut flux = Vec::with_capacity(mesh.triangle_count());
         let boundary = mesh.boundary();
         // (lambda*, phi_j) and (f_i, phi_j) - (mu_i grad u_ih, grad phi_j).
         let mut action = vec![0.0; count];
         let mut rows = [vec![0.0; count], vec![0.0; count]];
         for (t, id) in mesh.triangle_ids().enumerate() {
             let shape = mesh.shape(id);
-            for (k, v) in mesh.triangles()[t].iter().enumerate() {
+            let vertices = mesh.triangles()[t];
+            let own = [0, 1].map(|i| {
+                let g = shape.gradient(vertices.map(|v| given.displacement[i][v.index()]));
+                let mu = given.tension_mean[i][t];
+                [mu * g[0], mu * g[1]]
+            });
+            flux.push(own);
+            for (k, v) in vertices.iter().enumerate() {
                 let j = v.index();
-                action[j] += against_hat(&moments.action[t], k);
+                area[j] += shape.area / 3.0;
+                action[j] += moments.action.hat(t, shape.area, k);
                 let g = shape.gradients[k];
                 for i in 0..2 {
-                    let q = flux[i][t];
-                    rows[i][j] += against_hat(&moments.load[i][t], k)
+                    let q = own[i];
+                    rows[i][j] += moments.load[i].hat(t, shape.area, k)
                         - shape.area * (q[0] * g[0] + q[1] * g[1]);
                 }
             }
@@ -74,12 +81,13 @@ impl Shares {
         }
         extend_to_boundary(mesh, |j| given.gap(j), &mut theta);
         extend_to_boundary(mesh, |j| given.gap(j), &mut kappa);
-        Shares {
+        let shares = Shares {
             theta,
             kappa,
             residual: rows,
             area,
-        }
+        };
+        (shares, flux)
     }
 
     /// What the dual cell of `j` adds to the divergence of the flux of membrane `i`: +-kappa_j - rho_ij/|D_j|.
