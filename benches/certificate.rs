@@ -1,11 +1,7 @@
 //! What the certificate costs a triangle, beside a sparse matrix-vector product in the same run.
 //!
-//! `cargo bench -p membranes -p estimate --bench certificate` prints seconds; `-- count GRADE` certifies once more than `-- count none`
-//! without printing times, so that the difference of two counts under callgrind is the cost of one certificate:
-//!
-//! ```text
-//! valgrind --tool=callgrind --callgrind-out-file=/dev/null target/release/deps/certificate-HASH count rt0
-//! ```
+//! `cargo bench -p membranes -p estimate --bench certificate` prints seconds, and after `-- instructions` the instructions a triangle as
+//! valgrind's callgrind counts them, which travel between machines of one kind.
 
 use std::time::Instant;
 
@@ -101,8 +97,42 @@ fn best(repeat: usize, mut work: impl FnMut() -> f64) -> f64 {
     least
 }
 
+/// Counts this program under callgrind with one certificate and without any.
+fn instructions() {
+    let count = |grade: &str| -> Option<f64> {
+        let program = std::env::current_exe().ok()?;
+        let run = std::process::Command::new("valgrind")
+            .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+            .arg(program)
+            .args(["count", grade])
+            .output()
+            .ok()?;
+        let text = String::from_utf8_lossy(&run.stderr).into_owned();
+        let line = text.lines().find(|l| l.contains("Collected"))?;
+        line.split_whitespace().last()?.parse().ok()
+    };
+    let Some(none) = count("none") else {
+        println!("valgrind was not found: instructions are not counted");
+        return;
+    };
+    for grade in ["rt0", "rt1"] {
+        if let Some(with) = count(grade) {
+            println!(
+                "{grade}: {:.0} instructions a triangle",
+                (with - none) / COUNTED as f64
+            );
+        }
+    }
+}
+
+/// Triangles of the mesh that instructions are counted on.
+const COUNTED: usize = 6144;
+
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
+    if arguments.iter().any(|a| a == "instructions") {
+        return instructions();
+    }
     if let Some(at) = arguments.iter().position(|a| a == "count") {
         let case = Case::new(5);
         let bound = match arguments.get(at + 1).map(String::as_str) {
@@ -110,7 +140,8 @@ fn main() {
             Some("rt1") => case.certify(Grade::Rt1),
             _ => 0.0,
         };
-        println!("{} triangles, {bound:.6e}", case.mesh.triangle_count());
+        assert_eq!(case.mesh.triangle_count(), COUNTED);
+        println!("{bound:.6e}");
         return;
     }
     println!("constant loads and tensions, one thread, best of several");

@@ -182,3 +182,6 @@ fn contact_term(given: &Given<'_>, moments: &Moments, shares: &Shares, t: usize,
     }
     sum.max(0.0)
 }
+
+#[cfg(test)]
+mod tests;
