@@ -56,6 +56,9 @@ impl Reference {
                 iterations: 0,
                 unknowns: 0,
                 kkt_residual: 0.0,
+                algebraic_error: None,
+                contraction: None,
+                cycles: None,
             },
         };
         Reference {

@@ -1,0 +1,515 @@
+//! Conjugate gradients on a contact set that is read anew before every step, preconditioned by one cycle.
+//!
+//! A step: read the contact set off the iterate and its residual (gap closed, and nothing pulls it open); if it has changed, truncate
+//! the hat functions anew and bring the previous direction into the new space; precondition the residual by one
+//! cycle, make it conjugate to the previous direction, go to the least energy along it, and close the gaps that went negative.
+//! The iterate is feasible at all times. Closing gaps may raise the energy: a step that raises it is taken back, and
+//! a monotone cycle, which cannot, is made in its place. From a cold start monotone cycles come first, since truncation is worth little before
+//! the contact set is roughly known.
+//!
+//! The algebraic error is judged by what the steps gain: the energy lost in a step is the difference of the squared errors before and after, so that with
+//! a ratio rho of successive losses the squared error that remains is the last loss times rho/(1 - rho) (the sum of
+//! Hestenes and Stiefel, its tail extrapolated).
+
+use fem_core::SymmetricMatrix;
+
+use super::finest::Finest;
+use super::galerkin::Levels;
+use super::hierarchy::Hierarchy;
+use super::unknowns::Unknowns;
+use crate::error::SolveError;
+use crate::solution::Status;
+
+/// Steps after which an inequality is left to the active set method.
+pub(crate) const LIMIT: usize = 60;
+
+/// Steps after which a linear problem is left to it; it has no contact set to find.
+const LINEAR_LIMIT: usize = 120;
+
+/// From this step on the number still needed is predicted, and the attempt ended if the sum exceeds twice the limit.
+const FORESEEN: usize = 25;
+
+/// Monotone cycles from a cold start, at most.
+const COLD_CYCLES: usize = 8;
+
+/// A monotone cycle from a cold start that gains more than this part of what the one before gained is the last.
+const SLOW: f64 = 0.35;
+
+/// Steps that raise the energy, at most.
+const RISES: usize = 6;
+
+/// Pulls up to this many units of rounding of their row do not open a gap.
+const RELEASE: f64 = 16.0 * f64::EPSILON;
+
+/// The ratio of successive losses where none was seen: the error is as large as the last loss.
+const UNKNOWN_RATIO: f64 = 0.5;
+
+/// When an iterate is good enough.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Goal {
+    /// The largest |r_j|/d_j in the rows that must vanish is at most this part of the largest value.
+    Kkt(f64),
+    /// |r| <= 1e-12 |b| in the Euclidean norm, or what rounding allows.
+    Tight,
+    /// The estimate of the squared error in the norm of the matrix is at most this.
+    Energy(f64),
+}
+
+/// How a descent went.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Report {
+    /// Preconditioned steps.
+    pub steps: usize,
+    /// Monotone cycles.
+    pub monotone: usize,
+    /// How it ended.
+    pub status: Status,
+    /// Estimate of the squared error in the norm of the matrix.
+    pub error_squared: f64,
+    /// Ratio of the last two losses of energy, if there were two.
+    pub ratio: Option<f64>,
+}
+
+/// An iterate in the order of the hierarchy, and the vectors of the method.
+pub(crate) struct Descent<'a, U: Unknowns> {
+    pub hierarchy: &'a Hierarchy,
+    pub finest: &'a Finest<U>,
+    pub levels: &'a mut Levels<U>,
+    /// The matrices in the order of the mesh, for single rows.
+    pub matrices: &'a [&'a SymmetricMatrix],
+    /// Whether the gap must not be negative; else the problem is linear.
+    pub inequality: bool,
+    /// Sum of the magnitudes that the load of a rank was computed from.
+    pub load_scale: &'a dyn Fn(usize) -> f64,
+    /// The iterate; 0 on the boundary.
+    pub x: Vec<U::Value>,
+    /// Loads, boundary columns moved right.
+    pub b: Vec<U::Value>,
+    /// The largest value on the boundary.
+    pub boundary_size: f64,
+    /// The contact set.
+    pub contact: Vec<bool>,
+    /// b - A x.
+    pub r: Vec<U::Value>,
+    scratch: Vec<U::Value>,
+    correction: Vec<U::Value>,
+    direction: Vec<U::Value>,
+    image: Vec<U::Value>,
+    /// direction . image, once there is a direction.
+    curvature: Option<f64>,
+    /// Whether the levels hold the matrices truncated on `contact`.
+    swept: bool,
+}
+
+/// What one pass over the residual finds.
+struct Reading {
+    changed: bool,
+    worst: f64,
+    size: f64,
+    residual_squared: f64,
+    load_squared: f64,
+    rounding_squared: f64,
+}
+
+impl<'a, U: Unknowns> Descent<'a, U> {
+    /// An iterate with its load; `untruncated` says that the levels hold the plain matrices.
+    #[allow(clippy::too_many_arguments)]
+    pub fn new(
+        hierarchy: &'a Hierarchy,
+        finest: &'a Finest<U>,
+        levels: &'a mut Levels<U>,
+        matrices: &'a [&'a SymmetricMatrix],
+        inequality: bool,
+        load_scale: &'a dyn Fn(usize) -> f64,
+        values: Vectors<U>,
+    ) -> Descent<'a, U> {
+        let n = hierarchy.len();
+        let zeros = || vec![U::Value::default(); n];
+        Descent {
+            hierarchy,
+            finest,
+            levels,
+            matrices,
+            inequality,
+            load_scale,
+            x: values.x,
+            b: values.b,
+            boundary_size: values.boundary_size,
+            contact: vec![false; n],
+            r: zeros(),
+            scratch: zeros(),
+            correction: zeros(),
+            direction: zeros(),
+            image: zeros(),
+            curvature: None,
+            swept: values.plain,
+        }
+    }
+
+    /// Descends until the goal is reached, or no further.
+    ///
+    /// `ratio` is the ratio of losses to expect before two were seen.
+    pub fn run(
+        &mut self,
+        goal: Goal,
+        cold: bool,
+        ratio: Option<f64>,
+    ) -> Result<Report, SolveError> {
+        let mut report = Report {
+            steps: 0,
+            monotone: 0,
+            status: Status::Converged,
+            error_squared: 0.0,
+            ratio: None,
+        };
+        self.residual();
+        let mut last = None;
+        if cold && self.inequality {
+            last = self.monotone_start(&mut report)?;
+        }
+        let limit = if self.inequality { LIMIT } else { LINEAR_LIMIT };
+        let mut history = Vec::new();
+        let mut rises = 0;
+        let mut first = true;
+        loop {
+            let reading = self.read();
+            if reading.changed {
+                self.swept = false;
+            }
+            let reached = match goal {
+                Goal::Kkt(t) => reading.worst <= t * reading.size,
+                Goal::Tight => {
+                    reading.residual_squared
+                        <= (1e-24 * reading.load_squared).max(reading.rounding_squared)
+                }
+                Goal::Energy(target) => !first && report.error_squared <= target,
+            };
+            if reached || reading.residual_squared == 0.0 {
+                report.status = Status::Converged;
+                return Ok(report);
+            }
+            if !reading.worst.is_finite() {
+                report.status = Status::Stagnated;
+                return Ok(report);
+            }
+            history.push(reading.worst);
+            if report.steps >= limit {
+                report.status = Status::Limit;
+                return Ok(report);
+            }
+            if let Goal::Kkt(t) = goal
+                && hopeless(&history, t * reading.size, limit)
+            {
+                report.status = Status::Stagnated;
+                return Ok(report);
+            }
+            first = false;
+            report.steps += 1;
+            let Some(loss) = self.step()? else {
+                // Nothing left to gain in this precision.
+                report.status = Status::Stagnated;
+                return Ok(report);
+            };
+            let loss = if loss >= 0.0 {
+                loss
+            } else {
+                rises += 1;
+                report.monotone += 1;
+                if rises > RISES {
+                    report.status = Status::Stagnated;
+                    return Ok(report);
+                }
+                self.monotone()?
+            };
+            if let Some(last) = last
+                && last > 0.0
+            {
+                report.ratio = Some(loss / last);
+            }
+            let rho = report.ratio.or(ratio).unwrap_or(UNKNOWN_RATIO);
+            let rho = rho.clamp(1e-6, 0.95);
+            report.error_squared = loss * rho / (1.0 - rho);
+            last = Some(loss);
+        }
+    }
+
+    /// The residual computed afresh, and the contact set that belongs to it.
+    pub fn settle(&mut self) {
+        self.residual();
+        self.read();
+    }
+
+    /// r = b - A x.
+    fn residual(&mut self) {
+        self.finest
+            .multiply(self.hierarchy, &self.x, &mut self.scratch);
+        for ((r, &b), &y) in self.r.iter_mut().zip(&self.b).zip(&self.scratch) {
+            *r = U::plus(b, -1.0, y);
+        }
+    }
+
+    /// Reads the contact set and the size of the residual.
+    fn read(&mut self) -> Reading {
+        let mut found = Reading {
+            changed: false,
+            worst: 0.0,
+            size: self.boundary_size,
+            residual_squared: 0.0,
+            load_squared: 0.0,
+            rounding_squared: 0.0,
+        };
+        for p in 0..self.x.len() {
+            if self.hierarchy.fixed[p] {
+                continue;
+            }
+            let (x, r, d) = (self.x[p], self.r[p], self.finest.diagonal[p]);
+            let mut contact = false;
+            if self.inequality && U::gap(x) <= 0.0 {
+                let pull = U::pull(r, self.finest.share[p]);
+                contact = pull <= 0.0 || pull <= RELEASE * self.row_scale(p);
+                found.changed |= contact != self.contact[p];
+                self.contact[p] = contact;
+            } else if self.contact[p] {
+                self.contact[p] = false;
+                found.changed = true;
+            }
+            let misfit = U::misfit(r, d, contact);
+            // Not `max`, which would lose a NaN.
+            if misfit > found.worst || misfit.is_nan() {
+                found.worst = misfit;
+            }
+            found.size = found.size.max(U::size(x));
+            if !contact {
+                found.residual_squared += U::dot(r, r);
+            } else {
+                let g = U::gather(r, self.finest.share[p]);
+                found.residual_squared += U::dot(g, g);
+            }
+            found.load_squared += U::dot(self.b[p], self.b[p]);
+            let y = U::plus_plain(U::Value::default(), d, x);
+            found.rounding_squared += U::dot(y, y);
+        }
+        found.rounding_squared *= f64::EPSILON * f64::EPSILON;
+        if found.size == 0.0 {
+            found.size = 1.0;
+        }
+        found
+    }
+
+    /// The least over the fields of `|A||x| + |load|` in a row: what its rounding errors are relative to.
+    fn row_scale(&self, p: usize) -> f64 {
+        let j = self.hierarchy.vertex[p] as usize;
+        let pattern = self.matrices[0].pattern();
+        let scale = (self.load_scale)(p);
+        let sum = |i: usize| -> f64 {
+            let values = &self.matrices[i].values()[pattern.range(j)];
+            pattern
+                .columns(j)
+                .iter()
+                .zip(values)
+                .map(|(&k, a)| {
+                    let q = self.hierarchy.rank[k as usize] as usize;
+                    (a * U::at(self.x[q], i)).abs()
+                })
+                .sum()
+        };
+        (0..U::WIDTH).map(sum).fold(f64::INFINITY, f64::min) + scale
+    }
+
+    /// Truncates on the present contact set and brings the direction into the new space.
+    fn truncate(&mut self) -> Result<(), SolveError> {
+        if self.swept {
+            return Ok(());
+        }
+        self.levels
+            .sweep(self.hierarchy, self.finest, &self.contact)?;
+        self.swept = true;
+        if self.curvature.is_some() {
+            for p in 0..self.contact.len() {
+                if self.contact[p] {
+                    self.direction[p] = U::spread(self.direction[p], self.finest.share[p]);
+                }
+            }
+            self.finest
+                .multiply(self.hierarchy, &self.direction, &mut self.image);
+            let curvature = dot::<U>(&self.direction, &self.image);
+            self.curvature = (curvature > 0.0).then_some(curvature);
+        }
+        Ok(())
+    }
+
+    /// One step; twice the energy it has lost, negative and taken back if it has risen, `None` if there is no direction of descent.
+    fn step(&mut self) -> Result<Option<f64>, SolveError> {
+        self.truncate()?;
+        let n = self.x.len();
+        for p in 0..n {
+            self.scratch[p] = if self.hierarchy.fixed[p] {
+                U::Value::default()
+            } else if self.contact[p] {
+                U::gather(self.r[p], self.finest.share[p])
+            } else {
+                self.r[p]
+            };
+        }
+        self.levels
+            .cycle(self.hierarchy, &mut self.scratch, &mut self.correction);
+        let mut against = 0.0;
+        for p in 0..n {
+            if self.contact[p] {
+                self.correction[p] = U::spread(self.correction[p], self.finest.share[p]);
+            }
+            against += U::dot(self.correction[p], self.image[p]);
+        }
+        let beta = self.curvature.map_or(0.0, |curvature| -against / curvature);
+        for (d, &c) in self.direction.iter_mut().zip(&self.correction) {
+            *d = U::plus(c, beta, *d);
+        }
+        self.finest
+            .multiply(self.hierarchy, &self.direction, &mut self.image);
+        let curvature = dot::<U>(&self.direction, &self.image);
+        let slope = dot::<U>(&self.direction, &self.r);
+        if !(curvature > 0.0 && slope > 0.0 && curvature.is_finite()) {
+            self.curvature = None;
+            return Ok(None);
+        }
+        self.curvature = Some(curvature);
+        let length = slope / curvature;
+        let mut closed = Vec::new();
+        for p in 0..n {
+            if self.hierarchy.fixed[p] {
+                continue;
+            }
+            let x = U::plus(self.x[p], length, self.direction[p]);
+            self.r[p] = U::plus(self.r[p], -length, self.image[p]);
+            self.x[p] = x;
+            if self.inequality && U::gap(x) < 0.0 {
+                let y = U::close(x, self.finest.share[p]);
+                self.x[p] = y;
+                closed.push((p, U::plus(y, -1.0, x), self.r[p]));
+            }
+        }
+        let raised = self.move_residual(&closed);
+        let loss = length * slope - raised;
+        if loss < 0.0 && !closed.is_empty() {
+            for &(p, change, _) in &closed {
+                self.x[p] = U::plus(self.x[p], -1.0, change);
+            }
+            for p in 0..n {
+                let x = U::plus(self.x[p], -length, self.direction[p]);
+                self.x[p] = if U::gap(x) < 0.0 {
+                    U::close(x, self.finest.share[p])
+                } else {
+                    x
+                };
+            }
+            self.residual();
+        }
+        Ok(Some(loss))
+    }
+
+    /// Takes changes of single values into the residual; twice the energy they cost.
+    fn move_residual(&mut self, changes: &[(usize, U::Value, U::Value)]) -> f64 {
+        let pattern = self.matrices[0].pattern().clone();
+        for &(p, change, _) in changes {
+            let j = self.hierarchy.vertex[p] as usize;
+            for (at, &k) in pattern.range(j).zip(pattern.columns(j)) {
+                let q = self.hierarchy.rank[k as usize] as usize;
+                let a = U::plain(|i| -self.matrices[i].values()[at]);
+                self.r[q] = U::plus_plain(self.r[q], a, change);
+            }
+        }
+        changes
+            .iter()
+            .map(|&(p, change, before)| -U::dot(change, U::plus(before, 1.0, self.r[p])))
+            .sum()
+    }
+
+    /// One monotone cycle; twice the energy it has lost.
+    fn monotone(&mut self) -> Result<f64, SolveError> {
+        let n = self.x.len();
+        let none = vec![false; n];
+        self.levels.sweep(self.hierarchy, self.finest, &none)?;
+        self.swept = false;
+        self.curvature = None;
+        self.image.fill(U::Value::default());
+        let mut bound: Vec<f64> = (0..n).map(|p| -U::gap(self.x[p]).max(0.0)).collect();
+        for p in 0..n {
+            self.scratch[p] = if self.hierarchy.fixed[p] {
+                U::Value::default()
+            } else {
+                self.r[p]
+            };
+        }
+        let mut old_bound = Vec::new();
+        self.levels.monotone_cycle(
+            self.hierarchy,
+            &mut self.scratch,
+            &mut self.correction,
+            &mut bound,
+            &mut old_bound,
+        );
+        let mut before = std::mem::take(&mut self.r);
+        self.r = std::mem::take(&mut self.image);
+        for p in 0..n {
+            let x = U::plus(self.x[p], 1.0, self.correction[p]);
+            let new = if U::gap(x) < 0.0 {
+                U::close(x, self.finest.share[p])
+            } else {
+                x
+            };
+            self.correction[p] = U::plus(new, -1.0, self.x[p]);
+            self.x[p] = new;
+        }
+        self.residual();
+        let mut loss = 0.0;
+        for p in (0..n).filter(|&p| !self.hierarchy.fixed[p]) {
+            loss += U::dot(self.correction[p], U::plus(before[p], 1.0, self.r[p]));
+        }
+        before.fill(U::Value::default());
+        self.image = before;
+        Ok(loss.max(0.0))
+    }
+
+    /// Monotone cycles until they gain little; the last gain.
+    fn monotone_start(&mut self, report: &mut Report) -> Result<Option<f64>, SolveError> {
+        let mut last = None;
+        for _ in 0..COLD_CYCLES {
+            let loss = self.monotone()?;
+            report.monotone += 1;
+            let slow = last.is_some_and(|l| loss > SLOW * l);
+            last = Some(loss);
+            if slow || loss == 0.0 {
+                break;
+            }
+        }
+        // The matrices are those of the cycle, plain.
+        Ok(last)
+    }
+}
+
+/// What a descent begins with, in the order of the hierarchy.
+pub(crate) struct Vectors<U: Unknowns> {
+    /// The iterate, 0 on the boundary.
+    pub x: Vec<U::Value>,
+    /// Loads, boundary columns moved right.
+    pub b: Vec<U::Value>,
+    /// The largest value on the boundary.
+    pub boundary_size: f64,
+    /// Whether the levels hold the plain matrices already.
+    pub plain: bool,
+}
+
+fn dot<U: Unknowns>(x: &[U::Value], y: &[U::Value]) -> f64 {
+    x.iter().zip(y).map(|(&a, &b)| U::dot(a, b)).sum()
+}
+
+/// Whether the residuals of the last ten steps let more steps be expected than twice the limit.
+fn hopeless(history: &[f64], target: f64, limit: usize) -> bool {
+    let n = history.len();
+    if n < FORESEEN {
+        return false;
+    }
+    let fall = (history[n - 11] / history[n - 1]).ln() / 10.0;
+    let missing = (history[n - 1] / target).ln();
+    !(fall > 0.0) || n as f64 + missing / fall > 2.0 * limit as f64
+}
