@@ -156,6 +156,7 @@ impl<'a> Level<'a> {
             kkt_residual: kkt_residual(self.problem, &displacement, &force),
             algebraic_error: None,
             contraction: None,
+            first_cycle: None,
             cycles: None,
         };
         Ok(Solution {

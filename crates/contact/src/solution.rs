@@ -48,9 +48,12 @@ pub struct SolveInfo {
     /// solvers, which leave rounding. In a reduced model the mean with weight t_1 + t_2 and the gap with t_1 t_2/(t_1 + t_2) (M
     /// norm) add up to it.
     pub algebraic_error: Option<f64>,
-    /// Factor of the energy norm of the algebraic error in the last cycle seen on this mesh or on an earlier one; `None` for
-    /// direct solvers.
+    /// Factor of the energy norm of the algebraic error in a cycle: the largest among the last few, of all fields of the model; `None`
+    /// for direct solvers and where a single cycle was made.
     pub contraction: Option<f64>,
+    /// Factor of the energy norm of the algebraic error in the first cycle from a start, as later ones showed, here or on an
+    /// earlier mesh (then a little more is assumed); `None` where it is not known.
+    pub first_cycle: Option<f64>,
     /// Cycles field by field; `None` for direct solvers.
     pub cycles: Option<Cycles>,
 }

@@ -15,8 +15,8 @@ pub struct Start {
     pub force: Option<Vec<f64>>,
     /// Riesz representative of the action, where it is known: saves multigrid some cycles.
     pub sigma: Option<Vec<f64>>,
-    /// Contraction of a multigrid cycle as seen on earlier meshes ([`crate::SolveInfo::contraction`]).
-    pub contraction: Option<f64>,
+    /// What the first multigrid cycle did on earlier meshes ([`crate::SolveInfo::first_cycle`]).
+    pub first_cycle: Option<f64>,
     /// The contact set to begin with.
     pub contact: Vec<bool>,
 }
@@ -54,7 +54,7 @@ impl Start {
             displacement,
             force: None,
             sigma: Some(sigma),
-            contraction: solution.info.contraction,
+            first_cycle: solution.info.first_cycle,
             contact,
         }
     }
@@ -65,7 +65,7 @@ impl Start {
             displacement: solution.displacement.clone(),
             force: Some(solution.force.clone()),
             sigma: Some(solution.sigma.clone()),
-            contraction: solution.info.contraction,
+            first_cycle: solution.info.first_cycle,
             contact: solution.contact.clone(),
         }
     }

@@ -185,7 +185,7 @@ fn senseless_data_are_refused_by_name() {
         displacement: [vec![0.0; n], vec![0.0; n]],
         force: None,
         sigma: None,
-        contraction: None,
+        first_cycle: None,
         contact: vec![false; n - 1],
     };
     assert_eq!(

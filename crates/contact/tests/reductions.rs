@@ -291,7 +291,7 @@ fn equal_loads_touch_without_force_and_do_not_flicker() {
                     displacement: s.displacement.clone(),
                     force: None,
                     sigma: None,
-                    contraction: None,
+                    first_cycle: None,
                     contact: s.contact.clone(),
                 };
                 let again = solve(&problem, &settings(reduce), Some(&start)).unwrap();

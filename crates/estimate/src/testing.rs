@@ -51,6 +51,7 @@ pub(crate) fn solution(displacement: [Vec<f64>; 2], force: Vec<f64>, sigma: Vec<
             kkt_residual: 0.0,
             algebraic_error: None,
             contraction: None,
+            first_cycle: None,
             cycles: None,
         },
     }

@@ -9,7 +9,9 @@
 //!
 //! The algebraic error is judged by what the steps gain: the energy lost in a step is the difference of the squared errors before and after, so that with
 //! a ratio rho of successive losses the squared error that remains is the last loss times rho/(1 - rho) (the sum of
-//! Hestenes and Stiefel, its tail extrapolated).
+//! Hestenes and Stiefel, its tail extrapolated). One step shows no ratio. Then the part of the squared error that the first step left on
+//! an earlier mesh stands in, and where that is not good enough, or not known, at least three steps are made, and more until their gains have
+//! died away: slow parts of the error, as jumps of the tension or slivers make them, show only after the quick ones have gone.
 
 use fem_core::SymmetricMatrix;
 
@@ -44,6 +46,21 @@ const RELEASE: f64 = 16.0 * f64::EPSILON;
 /// The ratio of successive losses where none was seen: the error is as large as the last loss.
 const UNKNOWN_RATIO: f64 = 0.5;
 
+/// A ratio is taken to be at least this, and at most one minus this.
+const LEAST_RATIO: f64 = 1e-3;
+
+/// Ratios of losses among which the largest counts.
+const RECENT: usize = 3;
+
+/// Steps that show how the method converges on a mesh, at least.
+const LOOK: usize = 3;
+
+/// They go on until this part or less of what they gained after the first one seems to be left.
+const SEEN: f64 = 0.1;
+
+/// A first step is never believed to leave less than this part of the squared error.
+const LEAST_LEFT: f64 = 0.02;
+
 /// When an iterate is good enough.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Goal {
@@ -66,8 +83,34 @@ pub(crate) struct Report {
     pub status: Status,
     /// Estimate of the squared error in the norm of the matrix.
     pub error_squared: f64,
-    /// Ratio of the last two losses of energy, if there were two.
+    /// The largest ratio of successive losses among the last steps, if there were two.
     pub ratio: Option<f64>,
+    /// Part of the squared error that the first step left, as the later ones showed, if there were any.
+    pub left: Option<f64>,
+}
+
+impl Report {
+    /// Draws the conclusions from the losses; `left` is the part left by a first step elsewhere.
+    fn judge(&mut self, losses: &[f64], left: Option<f64>) {
+        let Some(&last) = losses.last() else {
+            return;
+        };
+        let recent = &losses[losses.len().saturating_sub(RECENT + 1)..];
+        self.ratio = recent
+            .windows(2)
+            .map(|pair| if pair[0] > 0.0 { pair[1] / pair[0] } else { 0.0 })
+            .reduce(f64::max);
+        let part = match self.ratio {
+            Some(ratio) => ratio,
+            None => left.unwrap_or(UNKNOWN_RATIO),
+        };
+        let part = part.clamp(LEAST_RATIO, 1.0 - LEAST_RATIO);
+        self.error_squared = last * part / (1.0 - part);
+        let later = losses[1..].iter().sum::<f64>() + self.error_squared;
+        if losses.len() > 1 && losses[0] + later > 0.0 {
+            self.left = Some((later / (losses[0] + later)).max(LEAST_LEFT));
+        }
+    }
 }
 
 /// An iterate in the order of the hierarchy, and the vectors of the method.
@@ -148,12 +191,12 @@ impl<'a, U: Unknowns> Descent<'a, U> {
 
     /// Descends until the goal is reached, or no further.
     ///
-    /// `ratio` is the ratio of losses to expect before two were seen.
+    /// `left` is the part of the squared error that a first step left on an earlier mesh.
     pub fn run(
         &mut self,
         goal: Goal,
         cold: bool,
-        ratio: Option<f64>,
+        left: Option<f64>,
     ) -> Result<Report, SolveError> {
         let mut report = Report {
             steps: 0,
@@ -161,16 +204,16 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             status: Status::Converged,
             error_squared: 0.0,
             ratio: None,
+            left: None,
         };
         self.residual();
-        let mut last = None;
+        let mut losses = Vec::new();
         if cold && self.inequality {
-            last = self.monotone_start(&mut report)?;
+            self.monotone_start(&mut report)?;
         }
         let limit = if self.inequality { LIMIT } else { LINEAR_LIMIT };
         let mut history = Vec::new();
         let mut rises = 0;
-        let mut first = true;
         loop {
             let reading = self.read();
             if reading.changed {
@@ -182,7 +225,15 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                     reading.residual_squared
                         <= (1e-24 * reading.load_squared).max(reading.rounding_squared)
                 }
-                Goal::Energy(target) => !first && report.error_squared <= target,
+                Goal::Energy(target) => {
+                    let later = losses.iter().skip(1).sum::<f64>();
+                    let rest = report.error_squared;
+                    let known = match losses.len() {
+                        1 => left.is_some(),
+                        n => n >= LOOK && (rest <= SEEN * later || rest <= SEEN * SEEN * target),
+                    };
+                    rest <= target && known
+                }
             };
             if reached || reading.residual_squared == 0.0 {
                 report.status = Status::Converged;
@@ -203,7 +254,6 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                 report.status = Status::Stagnated;
                 return Ok(report);
             }
-            first = false;
             report.steps += 1;
             let Some(loss) = self.step()? else {
                 // Nothing left to gain in this precision.
@@ -221,15 +271,8 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                 }
                 self.monotone()?
             };
-            if let Some(last) = last
-                && last > 0.0
-            {
-                report.ratio = Some(loss / last);
-            }
-            let rho = report.ratio.or(ratio).unwrap_or(UNKNOWN_RATIO);
-            let rho = rho.clamp(1e-6, 0.95);
-            report.error_squared = loss * rho / (1.0 - rho);
-            last = Some(loss);
+            losses.push(loss);
+            report.judge(&losses, left);
         }
     }
 
@@ -470,20 +513,19 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         Ok(loss.max(0.0))
     }
 
-    /// Monotone cycles until they gain little; the last gain.
-    fn monotone_start(&mut self, report: &mut Report) -> Result<Option<f64>, SolveError> {
+    /// Monotone cycles until they gain little.
+    fn monotone_start(&mut self, report: &mut Report) -> Result<(), SolveError> {
         let mut last = None;
         for _ in 0..COLD_CYCLES {
             let loss = self.monotone()?;
             report.monotone += 1;
-            let slow = last.is_some_and(|l| loss > SLOW * l);
+            let slow = last.is_some_and(|l: f64| loss > SLOW * l);
             last = Some(loss);
             if slow || loss == 0.0 {
                 break;
             }
         }
-        // The matrices are those of the cycle, plain.
-        Ok(last)
+        Ok(())
     }
 }
 

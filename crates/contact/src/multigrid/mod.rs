@@ -39,8 +39,9 @@ const KKT: f64 = 1e-10;
 /// The inequality is solved to this part of a prescribed KKT residual: the mean takes the rest.
 const SHARE: f64 = 0.9;
 
-/// What a ratio of losses grows by when it is handed on unseen: after some levels of one step each a second is made, to look again.
-const AGEING: f64 = 1.5;
+/// What the part left by a first step grows by when it is handed on unseen: after about ten levels of one step each it is looked at
+/// again.
+const AGEING: f64 = 1.25;
 
 /// A field after its descent, in the order of the mesh.
 struct Solved<U: Unknowns> {
@@ -284,8 +285,8 @@ impl Run<'_> {
             &load_scale,
             vectors,
         );
-        let ratio = self.start.and_then(|s| s.contraction).map(|c| c * c);
-        let report = descent.run(goal, self.start.is_none(), ratio)?;
+        let left = self.start.and_then(|s| s.first_cycle).map(|c| c * c);
+        let report = descent.run(goal, self.start.is_none(), left)?;
         descent.settle();
         let back = |values: &[U::Value]| -> Vec<U::Value> {
             hierarchy.rank.iter().map(|&p| values[p as usize]).collect()
@@ -315,15 +316,14 @@ impl Run<'_> {
         let inequality = model.inequality;
         let reports = [Some(inequality), model.mean, sigma_report];
         let status = worst_status(reports.into_iter().flatten().map(|r| r.status));
-        let seen = [Some(inequality), model.mean]
-            .into_iter()
-            .flatten()
-            .filter_map(|r| r.ratio);
-        let inherited = self.start.and_then(|s| s.contraction);
-        let contraction = match seen.reduce(f64::max) {
-            Some(ratio) => Some(ratio.clamp(0.0, 1.0).sqrt()),
-            None => inherited.map(|c| (c * c * AGEING).min(0.5).sqrt()),
+        let root_of_largest = |get: fn(&Report) -> Option<f64>| {
+            let fields = [Some(inequality), model.mean];
+            let seen = fields.iter().flatten().filter_map(get);
+            seen.reduce(f64::max).map(|ratio| ratio.clamp(0.0, 1.0).sqrt())
         };
+        let inherited = self.start.and_then(|s| s.first_cycle);
+        let first_cycle = root_of_largest(|r| r.left)
+            .or_else(|| inherited.map(|c| (c * c * AGEING).min(0.5).sqrt()));
         let steps = |r: Option<Report>| r.map_or(0, |r| r.steps);
         let cycles = Cycles {
             inequality: inequality.steps,
@@ -344,7 +344,8 @@ impl Run<'_> {
             },
             kkt_residual: kkt_residual(problem, &displacement, &force),
             algebraic_error: Some(model.error_squared.max(0.0).sqrt()),
-            contraction,
+            contraction: root_of_largest(|r| r.ratio),
+            first_cycle,
             cycles: Some(cycles),
         };
         Ok(Solution {

@@ -58,6 +58,7 @@ impl Reference {
                 kkt_residual: 0.0,
                 algebraic_error: None,
                 contraction: None,
+                first_cycle: None,
                 cycles: None,
             },
         };
