@@ -98,7 +98,13 @@ impl Report {
         let recent = &losses[losses.len().saturating_sub(RECENT + 1)..];
         self.ratio = recent
             .windows(2)
-            .map(|pair| if pair[0] > 0.0 { pair[1] / pair[0] } else { 0.0 })
+            .map(|pair| {
+                if pair[0] > 0.0 {
+                    pair[1] / pair[0]
+                } else {
+                    0.0
+                }
+            })
             .reduce(f64::max);
         let part = match self.ratio {
             Some(ratio) => ratio,
@@ -130,9 +136,9 @@ pub(crate) struct Descent<'a, U: Unknowns> {
     pub b: Vec<U::Value>,
     /// The largest value on the boundary.
     pub boundary_size: f64,
-    /// The contact set.
+    /// The contact set. With an inequality the boundary belongs to it: nothing moves there.
     pub contact: Vec<bool>,
-    /// b - A x.
+    /// b - A x, 0 on the boundary.
     pub r: Vec<U::Value>,
     scratch: Vec<U::Value>,
     correction: Vec<U::Value>,
@@ -147,11 +153,7 @@ pub(crate) struct Descent<'a, U: Unknowns> {
 /// What one pass over the residual finds.
 struct Reading {
     changed: bool,
-    worst: f64,
-    size: f64,
     residual_squared: f64,
-    load_squared: f64,
-    rounding_squared: f64,
 }
 
 impl<'a, U: Unknowns> Descent<'a, U> {
@@ -178,7 +180,11 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             x: values.x,
             b: values.b,
             boundary_size: values.boundary_size,
-            contact: vec![false; n],
+            contact: if inequality {
+                hierarchy.fixed.clone()
+            } else {
+                vec![false; n]
+            },
             r: zeros(),
             scratch: zeros(),
             correction: zeros(),
@@ -192,12 +198,7 @@ impl<'a, U: Unknowns> Descent<'a, U> {
     /// Descends until the goal is reached, or no further.
     ///
     /// `left` is the part of the squared error that a first step left on an earlier mesh.
-    pub fn run(
-        &mut self,
-        goal: Goal,
-        cold: bool,
-        left: Option<f64>,
-    ) -> Result<Report, SolveError> {
+    pub fn run(&mut self, goal: Goal, cold: bool, left: Option<f64>) -> Result<Report, SolveError> {
         let mut report = Report {
             steps: 0,
             monotone: 0,
@@ -220,11 +221,12 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                 self.swept = false;
             }
             let reached = match goal {
-                Goal::Kkt(t) => reading.worst <= t * reading.size,
-                Goal::Tight => {
-                    reading.residual_squared
-                        <= (1e-24 * reading.load_squared).max(reading.rounding_squared)
+                Goal::Kkt(t) => {
+                    let (worst, size) = self.misfit();
+                    history.push(worst / (t * size));
+                    worst <= t * size
                 }
+                Goal::Tight => reading.residual_squared <= self.tight(),
                 Goal::Energy(target) => {
                     let later = losses.iter().skip(1).sum::<f64>();
                     let rest = report.error_squared;
@@ -239,19 +241,12 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                 report.status = Status::Converged;
                 return Ok(report);
             }
-            if !reading.worst.is_finite() {
+            if !reading.residual_squared.is_finite() || hopeless(&history, limit) {
                 report.status = Status::Stagnated;
                 return Ok(report);
             }
-            history.push(reading.worst);
             if report.steps >= limit {
                 report.status = Status::Limit;
-                return Ok(report);
-            }
-            if let Goal::Kkt(t) = goal
-                && hopeless(&history, t * reading.size, limit)
-            {
-                report.status = Status::Stagnated;
                 return Ok(report);
             }
             report.steps += 1;
@@ -289,54 +284,58 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         for ((r, &b), &y) in self.r.iter_mut().zip(&self.b).zip(&self.scratch) {
             *r = U::plus(b, -1.0, y);
         }
+        self.hierarchy.clear_fixed(&mut self.r);
     }
 
     /// Reads the contact set and the size of the residual.
+    ///
+    /// The residual that is to be preconditioned, T'r, is left in `scratch`.
     fn read(&mut self) -> Reading {
-        let mut found = Reading {
-            changed: false,
-            worst: 0.0,
-            size: self.boundary_size,
-            residual_squared: 0.0,
-            load_squared: 0.0,
-            rounding_squared: 0.0,
-        };
-        for p in 0..self.x.len() {
-            if self.hierarchy.fixed[p] {
-                continue;
-            }
-            let (x, r, d) = (self.x[p], self.r[p], self.finest.diagonal[p]);
-            let mut contact = false;
-            if self.inequality && U::gap(x) <= 0.0 {
-                let pull = U::pull(r, self.finest.share[p]);
-                contact = pull <= 0.0 || pull <= RELEASE * self.row_scale(p);
-                found.changed |= contact != self.contact[p];
+        let mut changed = false;
+        if self.inequality {
+            for p in 0..self.x.len() {
+                let r = self.r[p];
+                let mut contact = false;
+                if U::gap(self.x[p]) <= 0.0 {
+                    let pull = U::pull(r, self.finest.share[p]);
+                    contact = pull <= 0.0 || pull <= RELEASE * self.row_scale(p);
+                }
+                changed |= contact != self.contact[p];
                 self.contact[p] = contact;
-            } else if self.contact[p] {
-                self.contact[p] = false;
-                found.changed = true;
+                self.scratch[p] = if contact {
+                    U::gather(r, self.finest.share[p])
+                } else {
+                    r
+                };
             }
-            let misfit = U::misfit(r, d, contact);
-            // Not `max`, which would lose a NaN.
-            if misfit > found.worst || misfit.is_nan() {
-                found.worst = misfit;
-            }
-            found.size = found.size.max(U::size(x));
-            if !contact {
-                found.residual_squared += U::dot(r, r);
-            } else {
-                let g = U::gather(r, self.finest.share[p]);
-                found.residual_squared += U::dot(g, g);
-            }
-            found.load_squared += U::dot(self.b[p], self.b[p]);
+        } else {
+            self.scratch.copy_from_slice(&self.r);
+        }
+        Reading {
+            changed,
+            residual_squared: dot::<U>(&self.scratch, &self.scratch),
+        }
+    }
+
+    /// The largest |r_j|/d_j in the rows that must vanish, and the largest value.
+    fn misfit(&self) -> (f64, f64) {
+        let (mut worst, mut size) = (0.0f64, self.boundary_size);
+        let rows = self.r.iter().zip(&self.x).zip(&self.finest.diagonal);
+        for (((&r, &x), &d), &contact) in rows.zip(&self.contact) {
+            worst = worst.max(U::misfit(r, d, contact));
+            size = size.max(U::size(x));
+        }
+        (worst, if size == 0.0 { 1.0 } else { size })
+    }
+
+    /// What |r|^2 is after a solve as exact as makes sense.
+    fn tight(&self) -> f64 {
+        let mut rounding = 0.0;
+        for (&x, &d) in self.x.iter().zip(&self.finest.diagonal) {
             let y = U::plus_plain(U::Value::default(), d, x);
-            found.rounding_squared += U::dot(y, y);
+            rounding += U::dot(y, y);
         }
-        found.rounding_squared *= f64::EPSILON * f64::EPSILON;
-        if found.size == 0.0 {
-            found.size = 1.0;
-        }
-        found
+        (1e-24 * dot::<U>(&self.b, &self.b)).max(f64::EPSILON * f64::EPSILON * rounding)
     }
 
     /// The least over the fields of `|A||x| + |load|` in a row: what its rounding errors are relative to.
@@ -359,6 +358,13 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         (0..U::WIDTH).map(sum).fold(f64::INFINITY, f64::min) + scale
     }
 
+    /// image = A direction, 0 on the boundary.
+    fn multiply_direction(&mut self) {
+        self.finest
+            .multiply(self.hierarchy, &self.direction, &mut self.image);
+        self.hierarchy.clear_fixed(&mut self.image);
+    }
+
     /// Truncates on the present contact set and brings the direction into the new space.
     fn truncate(&mut self) -> Result<(), SolveError> {
         if self.swept {
@@ -373,8 +379,7 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                     self.direction[p] = U::spread(self.direction[p], self.finest.share[p]);
                 }
             }
-            self.finest
-                .multiply(self.hierarchy, &self.direction, &mut self.image);
+            self.multiply_direction();
             let curvature = dot::<U>(&self.direction, &self.image);
             self.curvature = (curvature > 0.0).then_some(curvature);
         }
@@ -385,30 +390,22 @@ impl<'a, U: Unknowns> Descent<'a, U> {
     fn step(&mut self) -> Result<Option<f64>, SolveError> {
         self.truncate()?;
         let n = self.x.len();
-        for p in 0..n {
-            self.scratch[p] = if self.hierarchy.fixed[p] {
-                U::Value::default()
-            } else if self.contact[p] {
-                U::gather(self.r[p], self.finest.share[p])
-            } else {
-                self.r[p]
-            };
-        }
         self.levels
             .cycle(self.hierarchy, &mut self.scratch, &mut self.correction);
-        let mut against = 0.0;
-        for p in 0..n {
-            if self.contact[p] {
-                self.correction[p] = U::spread(self.correction[p], self.finest.share[p]);
+        if self.inequality {
+            let rows = self.correction.iter_mut().zip(&self.contact);
+            for ((c, &contact), &share) in rows.zip(&self.finest.share) {
+                if contact {
+                    *c = U::spread(*c, share);
+                }
             }
-            against += U::dot(self.correction[p], self.image[p]);
         }
+        let against = dot::<U>(&self.correction, &self.image);
         let beta = self.curvature.map_or(0.0, |curvature| -against / curvature);
         for (d, &c) in self.direction.iter_mut().zip(&self.correction) {
             *d = U::plus(c, beta, *d);
         }
-        self.finest
-            .multiply(self.hierarchy, &self.direction, &mut self.image);
+        self.multiply_direction();
         let curvature = dot::<U>(&self.direction, &self.image);
         let slope = dot::<U>(&self.direction, &self.r);
         if !(curvature > 0.0 && slope > 0.0 && curvature.is_finite()) {
@@ -418,17 +415,15 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         self.curvature = Some(curvature);
         let length = slope / curvature;
         let mut closed = Vec::new();
-        for p in 0..n {
-            if self.hierarchy.fixed[p] {
-                continue;
-            }
-            let x = U::plus(self.x[p], length, self.direction[p]);
-            self.r[p] = U::plus(self.r[p], -length, self.image[p]);
-            self.x[p] = x;
-            if self.inequality && U::gap(x) < 0.0 {
-                let y = U::close(x, self.finest.share[p]);
-                self.x[p] = y;
-                closed.push((p, U::plus(y, -1.0, x), self.r[p]));
+        let rows = self.x.iter_mut().zip(&mut self.r);
+        let moves = self.direction.iter().zip(&self.image);
+        for ((p, (x, r)), (&d, &y)) in rows.enumerate().zip(moves) {
+            let moved = U::plus(*x, length, d);
+            *r = U::plus(*r, -length, y);
+            *x = moved;
+            if self.inequality && U::gap(moved) < 0.0 {
+                *x = U::close(moved, self.finest.share[p]);
+                closed.push((p, U::plus(*x, -1.0, moved), *r));
             }
         }
         let raised = self.move_residual(&closed);
@@ -458,7 +453,9 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             for (at, &k) in pattern.range(j).zip(pattern.columns(j)) {
                 let q = self.hierarchy.rank[k as usize] as usize;
                 let a = U::plain(|i| -self.matrices[i].values()[at]);
-                self.r[q] = U::plus_plain(self.r[q], a, change);
+                if !self.hierarchy.fixed[q] {
+                    self.r[q] = U::plus_plain(self.r[q], a, change);
+                }
             }
         }
         changes
@@ -476,13 +473,7 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         self.curvature = None;
         self.image.fill(U::Value::default());
         let mut bound: Vec<f64> = (0..n).map(|p| -U::gap(self.x[p]).max(0.0)).collect();
-        for p in 0..n {
-            self.scratch[p] = if self.hierarchy.fixed[p] {
-                U::Value::default()
-            } else {
-                self.r[p]
-            };
-        }
+        self.scratch.copy_from_slice(&self.r);
         let mut old_bound = Vec::new();
         self.levels.monotone_cycle(
             self.hierarchy,
@@ -505,7 +496,7 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         }
         self.residual();
         let mut loss = 0.0;
-        for p in (0..n).filter(|&p| !self.hierarchy.fixed[p]) {
+        for p in 0..n {
             loss += U::dot(self.correction[p], U::plus(before[p], 1.0, self.r[p]));
         }
         before.fill(U::Value::default());
@@ -545,13 +536,13 @@ fn dot<U: Unknowns>(x: &[U::Value], y: &[U::Value]) -> f64 {
     x.iter().zip(y).map(|(&a, &b)| U::dot(a, b)).sum()
 }
 
-/// Whether the residuals of the last ten steps let more steps be expected than twice the limit.
-fn hopeless(history: &[f64], target: f64, limit: usize) -> bool {
+/// Whether the residuals of the last ten steps, in units of what is wanted, let more steps be expected than twice the limit.
+fn hopeless(history: &[f64], limit: usize) -> bool {
     let n = history.len();
     if n < FORESEEN {
         return false;
     }
     let fall = (history[n - 11] / history[n - 1]).ln() / 10.0;
-    let missing = (history[n - 1] / target).ln();
+    let missing = history[n - 1].ln();
     !(fall > 0.0) || n as f64 + missing / fall > 2.0 * limit as f64
 }

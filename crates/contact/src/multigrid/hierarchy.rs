@@ -22,6 +22,8 @@ pub(crate) struct Hierarchy {
     pub level: Vec<u32>,
     /// Whether a rank lies on the boundary.
     pub fixed: Vec<bool>,
+    /// The ranks on the boundary.
+    pub boundary: Vec<u32>,
     /// Ranks of a, b, c, d for every rank from n_0 on; d is c again on the boundary.
     pub quad: Vec<[u32; 4]>,
     /// Slots of the edges ab, ac, bc, ad, bd for every rank from n_0 on; [`Hierarchy::nowhere`] where an end lies on the boundary.
@@ -114,6 +116,9 @@ impl Hierarchy {
             .iter()
             .map(|&j| problem.boundary[j as usize])
             .collect();
+        let boundary = (0..fixed.len() as u32)
+            .filter(|&p| fixed[p as usize])
+            .collect();
         let quad: Vec<[u32; 4]> = vertex[n0..]
             .iter()
             .map(|&j| {
@@ -136,6 +141,7 @@ impl Hierarchy {
             rank,
             level,
             fixed,
+            boundary,
             quad,
             macro_start,
             macro_end,
@@ -147,6 +153,13 @@ impl Hierarchy {
     /// Number of vertices.
     pub fn len(&self) -> usize {
         self.vertex.len()
+    }
+
+    /// Sets values on the boundary to zero.
+    pub fn clear_fixed<T: Default>(&self, values: &mut [T]) {
+        for &p in &self.boundary {
+            values[p as usize] = T::default();
+        }
     }
 
     /// n_0, the number of vertices of the initial mesh.

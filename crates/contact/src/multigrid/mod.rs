@@ -297,7 +297,10 @@ impl Run<'_> {
             contact: hierarchy
                 .rank
                 .iter()
-                .map(|&p| descent.contact[p as usize])
+                .map(|&p| {
+                    let p = p as usize;
+                    descent.contact[p] && !hierarchy.fixed[p]
+                })
                 .collect(),
             report,
         })
@@ -319,7 +322,8 @@ impl Run<'_> {
         let root_of_largest = |get: fn(&Report) -> Option<f64>| {
             let fields = [Some(inequality), model.mean];
             let seen = fields.iter().flatten().filter_map(get);
-            seen.reduce(f64::max).map(|ratio| ratio.clamp(0.0, 1.0).sqrt())
+            seen.reduce(f64::max)
+                .map(|ratio| ratio.clamp(0.0, 1.0).sqrt())
         };
         let inherited = self.start.and_then(|s| s.first_cycle);
         let first_cycle = root_of_largest(|r| r.left)
