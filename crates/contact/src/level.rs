@@ -7,6 +7,7 @@ use crate::interior::{Interior, Role, ScalarFactor};
 use crate::interior_point;
 use crate::problem::DiscreteProblem;
 use crate::reduce::{Proportional, initial_pair, pair_system};
+use crate::settings::Settings;
 use crate::solution::{Reduction, Solution, SolveInfo, Status, kkt_residual};
 use crate::start::Start;
 use crate::system::{Fields, System};
@@ -47,16 +48,18 @@ pub(crate) struct Level<'a> {
     /// Its unknowns.
     pub interior: Interior,
     reduce: bool,
+    with_sigma: bool,
     scalar: Option<ScalarFactor>,
 }
 
 impl<'a> Level<'a> {
     /// No work yet.
-    pub fn new(problem: &'a DiscreteProblem, reduce: bool) -> Level<'a> {
+    pub fn new(problem: &'a DiscreteProblem, settings: &Settings) -> Level<'a> {
         Level {
             problem,
             interior: Interior::new(&problem.boundary),
-            reduce,
+            reduce: settings.reduce,
+            with_sigma: settings.sigma,
             scalar: None,
         }
     }
@@ -137,7 +140,7 @@ impl<'a> Level<'a> {
             Some(force) => force,
             None => self.forces(&displacement, &found.contact),
         };
-        let sigma = if force.iter().all(|&z| z == 0.0) {
+        let sigma = if !self.with_sigma || force.iter().all(|&z| z == 0.0) {
             vec![0.0; self.problem.order()]
         } else {
             self.sigma(&force)?
@@ -245,7 +248,7 @@ impl<'a> Level<'a> {
     }
 
     /// The Riesz representative: K sigma = z, zero on the boundary.
-    fn sigma(&mut self, force: &[f64]) -> Result<Vec<f64>, SolveError> {
+    pub fn sigma(&mut self, force: &[f64]) -> Result<Vec<f64>, SolveError> {
         let mut factor = self.take_scalar()?;
         factor.whole(&self.problem.laplacian, Role::Laplacian, &self.interior)?;
         let mut rhs: Vec<f64> = self.interior.iter().map(|j| force[j]).collect();

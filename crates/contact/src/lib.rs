@@ -33,7 +33,9 @@ pub use settings::{Settings, Solver, Tolerance};
 pub use solution::{
     Cycles, Reduction, Solution, SolveInfo, Status, kkt_residual, rounding_residual,
 };
-pub use solve::{ACTIVE_SET_LIMIT, INTERIOR_POINT_LIMIT, MULTIGRID_FROM, ROUNDING_LIMIT, solve};
+pub use solve::{
+    ACTIVE_SET_LIMIT, INTERIOR_POINT_LIMIT, MULTIGRID_FROM, ROUNDING_LIMIT, add_sigma, solve,
+};
 pub use start::Start;
 
 #[cfg(test)]

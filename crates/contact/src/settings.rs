@@ -40,6 +40,9 @@ pub struct Settings {
     /// Under [`Tolerance::Balanced`], the energy norm |||.||| of the algebraic error, as estimated, at which an iterative solver may
     /// stop; scaled units. A tenth of the error to be expected from the mesh loses nothing.
     pub energy_target: Option<f64>,
+    /// Whether sigma is computed. It is always solved to rounding, so that on a level that is only passed it would cost multigrid more
+    /// than all the rest; without it [`crate::Solution::sigma`] is zero until [`crate::add_sigma`].
+    pub sigma: bool,
 }
 
 impl Default for Settings {
@@ -49,6 +52,7 @@ impl Default for Settings {
             tolerance: Tolerance::Balanced,
             reduce: true,
             energy_target: None,
+            sigma: true,
         }
     }
 }

@@ -51,7 +51,7 @@ pub fn solve(
     start: Option<&Start>,
 ) -> Result<Solution, SolveError> {
     check(problem, start)?;
-    let mut level = Level::new(problem, settings.reduce);
+    let mut level = Level::new(problem, settings);
     // Without an interior vertex there is nothing to iterate on.
     let trivial = !problem.boundary.contains(&false);
     let solution = match settings.solver {
@@ -73,6 +73,34 @@ pub fn solve(
     judge(problem, solution, settings)
 }
 
+/// Computes sigma, K sigma = z, for a solution that was found without it ([`Settings::sigma`]).
+///
+/// # Errors
+/// As [`solve`] from the linear algebra.
+pub fn add_sigma(
+    problem: &DiscreteProblem,
+    settings: &Settings,
+    solution: &mut Solution,
+) -> Result<(), SolveError> {
+    let mut level = Level::new(problem, settings);
+    let iterative = match settings.solver {
+        Solver::Multigrid => true,
+        Solver::Auto => problem.order() >= MULTIGRID_FROM,
+        Solver::ActiveSet | Solver::Clarabel => false,
+    };
+    let found = if iterative {
+        multigrid::sigma(&level, settings, &solution.force).unwrap_or_default()
+    } else {
+        None
+    };
+    solution.sigma = match found {
+        Some(sigma) => sigma,
+        None if solution.force.iter().all(|&z| z == 0.0) => vec![0.0; problem.order()],
+        None => level.sigma(&solution.force)?,
+    };
+    Ok(())
+}
+
 /// Multigrid where there is a hierarchy, and the active set method from its last iterate should it miss its goal.
 fn by_multigrid(
     level: &mut Level,
@@ -81,7 +109,12 @@ fn by_multigrid(
 ) -> Result<Solution, SolveError> {
     let again = match multigrid::solve(level, settings, start) {
         Ok(None) => return level.solve(Method::ActiveSet, start),
-        Ok(Some(solution)) if meets(level.problem, &solution, settings) => return Ok(solution),
+        Ok(Some(mut solution)) if meets(level.problem, &solution, settings) => {
+            if solution.sigma.is_empty() {
+                solution.sigma = level.sigma(&solution.force)?;
+            }
+            return Ok(solution);
+        }
         Ok(Some(solution)) => {
             let finite = solution
                 .displacement

@@ -22,11 +22,8 @@ use super::unknowns::Unknowns;
 use crate::error::SolveError;
 use crate::solution::Status;
 
-/// Steps after which an inequality is left to the active set method.
-pub(crate) const LIMIT: usize = 60;
-
-/// Steps after which a linear problem is left to it; it has no contact set to find.
-const LINEAR_LIMIT: usize = 120;
+/// Steps after which a field is left to the direct method.
+const LIMIT: usize = 60;
 
 /// From this step on the number still needed is predicted, and the attempt ended if the sum exceeds twice the limit.
 const FORESEEN: usize = 25;
@@ -35,7 +32,10 @@ const FORESEEN: usize = 25;
 const COLD_CYCLES: usize = 8;
 
 /// A monotone cycle from a cold start that gains more than this part of what the one before gained is the last.
-const SLOW: f64 = 0.35;
+const SLOW: f64 = 0.08;
+
+/// From a cold start a step that closes more gaps than this part of the contact set is followed by a monotone cycle.
+const OVERSHOOT: f64 = 1e-3;
 
 /// Steps that raise the energy, at most.
 const RISES: usize = 6;
@@ -146,6 +146,8 @@ pub(crate) struct Descent<'a, U: Unknowns> {
     image: Vec<U::Value>,
     /// direction . image, once there is a direction.
     curvature: Option<f64>,
+    /// Gaps that the last step closed.
+    closed: usize,
     /// Whether the levels hold the matrices truncated on `contact`.
     swept: bool,
 }
@@ -191,6 +193,7 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             direction: zeros(),
             image: zeros(),
             curvature: None,
+            closed: 0,
             swept: values.plain,
         }
     }
@@ -212,7 +215,6 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         if cold && self.inequality {
             self.monotone_start(&mut report)?;
         }
-        let limit = if self.inequality { LIMIT } else { LINEAR_LIMIT };
         let mut history = Vec::new();
         let mut rises = 0;
         loop {
@@ -226,7 +228,11 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                     history.push(worst / (t * size));
                     worst <= t * size
                 }
-                Goal::Tight => reading.residual_squared <= self.tight(),
+                Goal::Tight => {
+                    let over = (reading.residual_squared / self.tight()).sqrt();
+                    history.push(over);
+                    over <= 1.0
+                }
                 Goal::Energy(target) => {
                     let later = losses.iter().skip(1).sum::<f64>();
                     let rest = report.error_squared;
@@ -241,11 +247,11 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                 report.status = Status::Converged;
                 return Ok(report);
             }
-            if !reading.residual_squared.is_finite() || hopeless(&history, limit) {
+            if !reading.residual_squared.is_finite() || hopeless(&history) {
                 report.status = Status::Stagnated;
                 return Ok(report);
             }
-            if report.steps >= limit {
+            if report.steps >= LIMIT {
                 report.status = Status::Limit;
                 return Ok(report);
             }
@@ -256,7 +262,14 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                 return Ok(report);
             };
             let loss = if loss >= 0.0 {
-                loss
+                // From a cold start, closing many gaps at once overshoots; released they are only a layer of vertices a step.
+                let contact = || self.contact.iter().filter(|&&c| c).count();
+                if cold && self.closed > 0 && self.closed as f64 > OVERSHOOT * contact() as f64 {
+                    report.monotone += 1;
+                    loss + self.monotone()?
+                } else {
+                    loss
+                }
             } else {
                 rises += 1;
                 report.monotone += 1;
@@ -426,6 +439,7 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                 closed.push((p, U::plus(*x, -1.0, moved), *r));
             }
         }
+        self.closed = closed.len();
         let raised = self.move_residual(&closed);
         let loss = length * slope - raised;
         if loss < 0.0 && !closed.is_empty() {
@@ -447,12 +461,13 @@ impl<'a, U: Unknowns> Descent<'a, U> {
 
     /// Takes changes of single values into the residual; twice the energy they cost.
     fn move_residual(&mut self, changes: &[(usize, U::Value, U::Value)]) -> f64 {
-        let pattern = self.matrices[0].pattern().clone();
+        let matrices = self.matrices;
+        let pattern = matrices[0].pattern();
         for &(p, change, _) in changes {
             let j = self.hierarchy.vertex[p] as usize;
             for (at, &k) in pattern.range(j).zip(pattern.columns(j)) {
                 let q = self.hierarchy.rank[k as usize] as usize;
-                let a = U::plain(|i| -self.matrices[i].values()[at]);
+                let a = U::plain(|i| -matrices[i].values()[at]);
                 if !self.hierarchy.fixed[q] {
                     self.r[q] = U::plus_plain(self.r[q], a, change);
                 }
@@ -537,12 +552,12 @@ fn dot<U: Unknowns>(x: &[U::Value], y: &[U::Value]) -> f64 {
 }
 
 /// Whether the residuals of the last ten steps, in units of what is wanted, let more steps be expected than twice the limit.
-fn hopeless(history: &[f64], limit: usize) -> bool {
+fn hopeless(history: &[f64]) -> bool {
     let n = history.len();
     if n < FORESEEN {
         return false;
     }
     let fall = (history[n - 11] / history[n - 1]).ln() / 10.0;
     let missing = history[n - 1].ln();
-    !(fall > 0.0) || n as f64 + missing / fall > 2.0 * limit as f64
+    !(fall > 0.0) || n as f64 + missing / fall > 2.0 * LIMIT as f64
 }

@@ -53,7 +53,7 @@ struct Solved<U: Unknowns> {
 
 /// The solution by multigrid; `None` on a mesh without bisections, where the initial mesh is everything.
 ///
-/// Its status says whether every field reached its goal.
+/// Its status says whether every field of the model reached its goal; sigma is empty where its own solve did not converge.
 pub(crate) fn solve(
     level: &Level,
     settings: &Settings,
@@ -76,6 +76,25 @@ pub(crate) fn solve(
         None => run.pair(),
     }
     .map(Some)
+}
+
+/// K sigma = z for given forces, where there is a hierarchy and the method converges.
+pub(crate) fn sigma(
+    level: &Level,
+    settings: &Settings,
+    force: &[f64],
+) -> Result<Option<Vec<f64>>, SolveError> {
+    if !has_levels(level.problem) {
+        return Ok(None);
+    }
+    let run = Run {
+        level,
+        settings,
+        start: None,
+        hierarchy: &Hierarchy::new(level.problem),
+    };
+    let (sigma, _) = run.sigma(force, None)?;
+    Ok(Some(sigma).filter(|s| !s.is_empty()))
 }
 
 /// One solve on one hierarchy.
@@ -315,9 +334,13 @@ impl Run<'_> {
             contact,
             ..
         } = model;
-        let (sigma, sigma_report) = self.sigma(&force, model.laplacian)?;
+        let (sigma, sigma_report) = if self.settings.sigma {
+            self.sigma(&force, model.laplacian)?
+        } else {
+            (vec![0.0; force.len()], None)
+        };
         let inequality = model.inequality;
-        let reports = [Some(inequality), model.mean, sigma_report];
+        let reports = [Some(inequality), model.mean];
         let status = worst_status(reports.into_iter().flatten().map(|r| r.status));
         let root_of_largest = |get: fn(&Report) -> Option<f64>| {
             let fields = [Some(inequality), model.mean];
@@ -361,7 +384,7 @@ impl Run<'_> {
         })
     }
 
-    /// K sigma = z, always as exactly as rounding allows.
+    /// K sigma = z, always as exactly as rounding allows; empty where that takes too many cycles.
     fn sigma(
         &self,
         force: &[f64],
@@ -385,7 +408,11 @@ impl Run<'_> {
         };
         let vectors = self.vectors::<Scalar>(&matrices, &[initial], &load, false);
         let solved = self.descend(&finest, &mut levels, &matrices, None, vectors, Goal::Tight)?;
-        Ok((solved.x, Some(solved.report)))
+        let sigma = match solved.report.status {
+            Status::Converged => solved.x,
+            _ => Vec::new(),
+        };
+        Ok((sigma, Some(solved.report)))
     }
 }
 

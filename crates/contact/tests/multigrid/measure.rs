@@ -149,6 +149,7 @@ fn seconds() {
                 );
                 for factor in [1.0, 0.1] {
                     let mut loose = multigrid(Tolerance::Balanced, true);
+                    loose.sigma = false;
                     loose.energy_target = Some(factor * stage.eta);
                     let clock = now();
                     let one = solve(stage.problem, &loose, stage.start).unwrap();

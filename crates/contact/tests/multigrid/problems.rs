@@ -144,6 +144,7 @@ pub fn multigrid(tolerance: Tolerance, reduce: bool) -> Settings {
         tolerance,
         reduce,
         energy_target: None,
+        sigma: true,
     }
 }
 
@@ -168,6 +169,7 @@ pub fn adaptively<T>(
     let mut start: Option<Start> = None;
     let mut eta = f64::INFINITY;
     let mut settings = multigrid(Tolerance::Balanced, true);
+    settings.sigma = false;
     loop {
         let problem = data.on(&mesh);
         if mesh.vertex_count() >= vertices {
