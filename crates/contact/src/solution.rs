@@ -54,7 +54,7 @@ pub struct SolveInfo {
     /// Factor of the energy norm of the algebraic error in the first cycle from a start, as later ones showed, here or on an
     /// earlier mesh (then a little more is assumed); `None` where it is not known.
     pub first_cycle: Option<f64>,
-    /// Cycles field by field; `None` for direct solvers.
+    /// Cycles field by field, also where multigrid then handed over; `None` for direct solvers.
     pub cycles: Option<Cycles>,
 }
 

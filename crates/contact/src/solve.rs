@@ -107,6 +107,7 @@ fn by_multigrid(
     settings: &Settings,
     start: Option<&Start>,
 ) -> Result<Solution, SolveError> {
+    let mut cycles = None;
     let again = match multigrid::solve(level, settings, start) {
         Ok(None) => return level.solve(Method::ActiveSet, start),
         Ok(Some(mut solution)) if meets(level.problem, &solution, settings) => {
@@ -116,6 +117,7 @@ fn by_multigrid(
             return Ok(solution);
         }
         Ok(Some(solution)) => {
+            cycles = solution.info.cycles;
             let finite = solution
                 .displacement
                 .iter()
@@ -127,6 +129,7 @@ fn by_multigrid(
         Err(_) => None,
     };
     let mut solution = level.solve(Method::ActiveSet, again.as_ref().or(start))?;
+    solution.info.cycles = cycles;
     solution.info.solver = match solution.info.solver {
         "active-set" => "multigrid+active-set",
         _ => "multigrid+active-set+monotone",

@@ -28,15 +28,6 @@ const LIMIT: usize = 60;
 /// From this step on the number still needed is predicted, and the attempt ended if the sum exceeds twice the limit.
 const FORESEEN: usize = 25;
 
-/// Monotone cycles from a cold start, at most.
-const COLD_CYCLES: usize = 8;
-
-/// A monotone cycle from a cold start that gains more than this part of what the one before gained is the last.
-const SLOW: f64 = 0.08;
-
-/// From a cold start a step that closes more gaps than this part of the contact set is followed by a monotone cycle.
-const OVERSHOOT: f64 = 1e-3;
-
 /// Steps that raise the energy, at most.
 const RISES: usize = 6;
 
@@ -140,16 +131,20 @@ pub(crate) struct Descent<'a, U: Unknowns> {
     pub contact: Vec<bool>,
     /// b - A x, 0 on the boundary.
     pub r: Vec<U::Value>,
-    scratch: Vec<U::Value>,
-    correction: Vec<U::Value>,
-    direction: Vec<U::Value>,
-    image: Vec<U::Value>,
+    pub(super) scratch: Vec<U::Value>,
+    pub(super) correction: Vec<U::Value>,
+    pub(super) direction: Vec<U::Value>,
+    pub(super) image: Vec<U::Value>,
     /// direction . image, once there is a direction.
-    curvature: Option<f64>,
-    /// Gaps that the last step closed.
-    closed: usize,
+    pub(super) curvature: Option<f64>,
+    /// Whether the iterate comes from nothing.
+    pub(super) cold: bool,
+    /// Monotone cycles so far.
+    pub(super) monotone_cycles: usize,
+    /// Steps taken back so far.
+    pub(super) taken_back: usize,
     /// Whether the levels hold the matrices truncated on `contact`.
-    swept: bool,
+    pub(super) swept: bool,
 }
 
 /// What one pass over the residual finds.
@@ -193,7 +188,9 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             direction: zeros(),
             image: zeros(),
             curvature: None,
-            closed: 0,
+            cold: false,
+            monotone_cycles: 0,
+            taken_back: 0,
             swept: values.plain,
         }
     }
@@ -202,6 +199,12 @@ impl<'a, U: Unknowns> Descent<'a, U> {
     ///
     /// `left` is the part of the squared error that a first step left on an earlier mesh.
     pub fn run(&mut self, goal: Goal, cold: bool, left: Option<f64>) -> Result<Report, SolveError> {
+        let mut report = self.descend(goal, cold, left)?;
+        report.monotone = self.monotone_cycles;
+        Ok(report)
+    }
+
+    fn descend(&mut self, goal: Goal, cold: bool, left: Option<f64>) -> Result<Report, SolveError> {
         let mut report = Report {
             steps: 0,
             monotone: 0,
@@ -212,11 +215,11 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         };
         self.residual();
         let mut losses = Vec::new();
+        self.cold = cold;
         if cold && self.inequality {
-            self.monotone_start(&mut report)?;
+            self.monotone_start()?;
         }
         let mut history = Vec::new();
-        let mut rises = 0;
         loop {
             let reading = self.read();
             if reading.changed {
@@ -261,24 +264,10 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                 report.status = Status::Stagnated;
                 return Ok(report);
             };
-            let loss = if loss >= 0.0 {
-                // From a cold start, closing many gaps at once overshoots; released they are only a layer of vertices a step.
-                let contact = || self.contact.iter().filter(|&&c| c).count();
-                if cold && self.closed > 0 && self.closed as f64 > OVERSHOOT * contact() as f64 {
-                    report.monotone += 1;
-                    loss + self.monotone()?
-                } else {
-                    loss
-                }
-            } else {
-                rises += 1;
-                report.monotone += 1;
-                if rises > RISES {
-                    report.status = Status::Stagnated;
-                    return Ok(report);
-                }
-                self.monotone()?
-            };
+            if self.taken_back > RISES {
+                report.status = Status::Stagnated;
+                return Ok(report);
+            }
             losses.push(loss);
             report.judge(&losses, left);
         }
@@ -288,16 +277,6 @@ impl<'a, U: Unknowns> Descent<'a, U> {
     pub fn settle(&mut self) {
         self.residual();
         self.read();
-    }
-
-    /// r = b - A x.
-    fn residual(&mut self) {
-        self.finest
-            .multiply(self.hierarchy, &self.x, &mut self.scratch);
-        for ((r, &b), &y) in self.r.iter_mut().zip(&self.b).zip(&self.scratch) {
-            *r = U::plus(b, -1.0, y);
-        }
-        self.hierarchy.clear_fixed(&mut self.r);
     }
 
     /// Reads the contact set and the size of the residual.
@@ -370,169 +349,6 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         };
         (0..U::WIDTH).map(sum).fold(f64::INFINITY, f64::min) + scale
     }
-
-    /// image = A direction, 0 on the boundary.
-    fn multiply_direction(&mut self) {
-        self.finest
-            .multiply(self.hierarchy, &self.direction, &mut self.image);
-        self.hierarchy.clear_fixed(&mut self.image);
-    }
-
-    /// Truncates on the present contact set and brings the direction into the new space.
-    fn truncate(&mut self) -> Result<(), SolveError> {
-        if self.swept {
-            return Ok(());
-        }
-        self.levels
-            .sweep(self.hierarchy, self.finest, &self.contact)?;
-        self.swept = true;
-        if self.curvature.is_some() {
-            for p in 0..self.contact.len() {
-                if self.contact[p] {
-                    self.direction[p] = U::spread(self.direction[p], self.finest.share[p]);
-                }
-            }
-            self.multiply_direction();
-            let curvature = dot::<U>(&self.direction, &self.image);
-            self.curvature = (curvature > 0.0).then_some(curvature);
-        }
-        Ok(())
-    }
-
-    /// One step; twice the energy it has lost, negative and taken back if it has risen, `None` if there is no direction of descent.
-    fn step(&mut self) -> Result<Option<f64>, SolveError> {
-        self.truncate()?;
-        let n = self.x.len();
-        self.levels
-            .cycle(self.hierarchy, &mut self.scratch, &mut self.correction);
-        if self.inequality {
-            let rows = self.correction.iter_mut().zip(&self.contact);
-            for ((c, &contact), &share) in rows.zip(&self.finest.share) {
-                if contact {
-                    *c = U::spread(*c, share);
-                }
-            }
-        }
-        let against = dot::<U>(&self.correction, &self.image);
-        let beta = self.curvature.map_or(0.0, |curvature| -against / curvature);
-        for (d, &c) in self.direction.iter_mut().zip(&self.correction) {
-            *d = U::plus(c, beta, *d);
-        }
-        self.multiply_direction();
-        let curvature = dot::<U>(&self.direction, &self.image);
-        let slope = dot::<U>(&self.direction, &self.r);
-        if !(curvature > 0.0 && slope > 0.0 && curvature.is_finite()) {
-            self.curvature = None;
-            return Ok(None);
-        }
-        self.curvature = Some(curvature);
-        let length = slope / curvature;
-        let mut closed = Vec::new();
-        let rows = self.x.iter_mut().zip(&mut self.r);
-        let moves = self.direction.iter().zip(&self.image);
-        for ((p, (x, r)), (&d, &y)) in rows.enumerate().zip(moves) {
-            let moved = U::plus(*x, length, d);
-            *r = U::plus(*r, -length, y);
-            *x = moved;
-            if self.inequality && U::gap(moved) < 0.0 {
-                *x = U::close(moved, self.finest.share[p]);
-                closed.push((p, U::plus(*x, -1.0, moved), *r));
-            }
-        }
-        self.closed = closed.len();
-        let raised = self.move_residual(&closed);
-        let loss = length * slope - raised;
-        if loss < 0.0 && !closed.is_empty() {
-            for &(p, change, _) in &closed {
-                self.x[p] = U::plus(self.x[p], -1.0, change);
-            }
-            for p in 0..n {
-                let x = U::plus(self.x[p], -length, self.direction[p]);
-                self.x[p] = if U::gap(x) < 0.0 {
-                    U::close(x, self.finest.share[p])
-                } else {
-                    x
-                };
-            }
-            self.residual();
-        }
-        Ok(Some(loss))
-    }
-
-    /// Takes changes of single values into the residual; twice the energy they cost.
-    fn move_residual(&mut self, changes: &[(usize, U::Value, U::Value)]) -> f64 {
-        let matrices = self.matrices;
-        let pattern = matrices[0].pattern();
-        for &(p, change, _) in changes {
-            let j = self.hierarchy.vertex[p] as usize;
-            for (at, &k) in pattern.range(j).zip(pattern.columns(j)) {
-                let q = self.hierarchy.rank[k as usize] as usize;
-                let a = U::plain(|i| -matrices[i].values()[at]);
-                if !self.hierarchy.fixed[q] {
-                    self.r[q] = U::plus_plain(self.r[q], a, change);
-                }
-            }
-        }
-        changes
-            .iter()
-            .map(|&(p, change, before)| -U::dot(change, U::plus(before, 1.0, self.r[p])))
-            .sum()
-    }
-
-    /// One monotone cycle; twice the energy it has lost.
-    fn monotone(&mut self) -> Result<f64, SolveError> {
-        let n = self.x.len();
-        let none = vec![false; n];
-        self.levels.sweep(self.hierarchy, self.finest, &none)?;
-        self.swept = false;
-        self.curvature = None;
-        self.image.fill(U::Value::default());
-        let mut bound: Vec<f64> = (0..n).map(|p| -U::gap(self.x[p]).max(0.0)).collect();
-        self.scratch.copy_from_slice(&self.r);
-        let mut old_bound = Vec::new();
-        self.levels.monotone_cycle(
-            self.hierarchy,
-            &mut self.scratch,
-            &mut self.correction,
-            &mut bound,
-            &mut old_bound,
-        );
-        let mut before = std::mem::take(&mut self.r);
-        self.r = std::mem::take(&mut self.image);
-        for p in 0..n {
-            let x = U::plus(self.x[p], 1.0, self.correction[p]);
-            let new = if U::gap(x) < 0.0 {
-                U::close(x, self.finest.share[p])
-            } else {
-                x
-            };
-            self.correction[p] = U::plus(new, -1.0, self.x[p]);
-            self.x[p] = new;
-        }
-        self.residual();
-        let mut loss = 0.0;
-        for p in 0..n {
-            loss += U::dot(self.correction[p], U::plus(before[p], 1.0, self.r[p]));
-        }
-        before.fill(U::Value::default());
-        self.image = before;
-        Ok(loss.max(0.0))
-    }
-
-    /// Monotone cycles until they gain little.
-    fn monotone_start(&mut self, report: &mut Report) -> Result<(), SolveError> {
-        let mut last = None;
-        for _ in 0..COLD_CYCLES {
-            let loss = self.monotone()?;
-            report.monotone += 1;
-            let slow = last.is_some_and(|l: f64| loss > SLOW * l);
-            last = Some(loss);
-            if slow || loss == 0.0 {
-                break;
-            }
-        }
-        Ok(())
-    }
 }
 
 /// What a descent begins with, in the order of the hierarchy.
@@ -547,7 +363,7 @@ pub(crate) struct Vectors<U: Unknowns> {
     pub plain: bool,
 }
 
-fn dot<U: Unknowns>(x: &[U::Value], y: &[U::Value]) -> f64 {
+pub(super) fn dot<U: Unknowns>(x: &[U::Value], y: &[U::Value]) -> f64 {
     x.iter().zip(y).map(|(&a, &b)| U::dot(a, b)).sum()
 }
 

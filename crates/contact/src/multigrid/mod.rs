@@ -1,7 +1,7 @@
 //! Multigrid: conjugate gradients preconditioned by one symmetric cycle over the bisection hierarchy, truncated on the contact set.
 //!
 //! From the bottom up: `hierarchy` (what the births say), `unknowns` (one field or two), `finest` (the matrix of the mesh), `galerkin`
-//! (those of all levels), `coarse` (the initial mesh), `cycle`, `descent` (the method), and here the fields of a
+//! (those of all levels), `coarse` (the initial mesh), `cycle`, `step` and `descent` (the method), and here the fields of a
 //! problem one after the other. Where the tensions reduce these are the mean (linear), the gap (an obstacle problem) and sigma; else both displacements
 //! together, glued where they touch, and sigma.
 
@@ -11,6 +11,7 @@ mod descent;
 mod finest;
 mod galerkin;
 mod hierarchy;
+mod step;
 mod unknowns;
 
 use fem_core::SymmetricMatrix;

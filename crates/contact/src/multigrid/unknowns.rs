@@ -310,7 +310,12 @@ impl Unknowns for Pair {
         if gap < bound && give > 0.0 {
             let z = (bound - gap) / give;
             let [x, y] = Pair::times(inverse, [z, -z]);
-            [u[0] + x, u[1] + y]
+            // The softer membrane follows the stiffer one, so that the gap comes out as asked for to rounding of the result.
+            if inverse[0] <= inverse[2] {
+                [u[0] + x, u[0] + x - bound]
+            } else {
+                [u[1] + y + bound, u[1] + y]
+            }
         } else {
             u
         }

@@ -23,7 +23,7 @@ fn count(data: &Data, mesh: Mesh, vertices: usize) -> Count {
         let by_multigrid = |start: Option<&Start>| -> Solution {
             let s = solve(stage.problem, &tight, start).expect("a solution");
             assert_exact(stage.problem, &s);
-            assert_eq!(s.info.solver, "multigrid");
+            assert_eq!(s.info.solver, "multigrid", "{:?}", s.info);
             assert!(s.info.kkt_residual <= 1e-10, "{:?}", s.info);
             s
         };
