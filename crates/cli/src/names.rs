@@ -10,6 +10,7 @@ pub fn solver(solver: Solver) -> &'static str {
         Solver::Auto => "auto",
         Solver::Clarabel => "clarabel",
         Solver::ActiveSet => "active-set",
+        Solver::Multigrid => "multigrid",
     }
 }
 

@@ -238,8 +238,12 @@ proptest! {
     ) {
         let problem = random_problem(seed, n, strength, kind);
         for reduce in [true, false] {
-            let a = Level::new(&problem, reduce).solve(Method::ActiveSet, None).unwrap();
-            let b = Level::new(&problem, reduce).solve(Method::Monotone, None).unwrap();
+            let settings = crate::Settings {
+                reduce,
+                ..crate::Settings::default()
+            };
+            let a = Level::new(&problem, &settings).solve(Method::ActiveSet, None).unwrap();
+            let b = Level::new(&problem, &settings).solve(Method::Monotone, None).unwrap();
             assert_exact(&problem, &a);
             assert_exact(&problem, &b);
             prop_assert!(a.info.kkt_residual <= 1e-10, "{:?}", a.info);

@@ -7,6 +7,7 @@ use crate::interior::{Interior, Role, ScalarFactor};
 use crate::interior_point;
 use crate::problem::DiscreteProblem;
 use crate::reduce::{Proportional, initial_pair, pair_system};
+use crate::settings::Settings;
 use crate::solution::{Reduction, Solution, SolveInfo, Status, kkt_residual};
 use crate::start::Start;
 use crate::system::{Fields, System};
@@ -15,7 +16,7 @@ use crate::system::{Fields, System};
 pub(crate) const INTERIOR_POINT: &str = "clarabel";
 
 /// Rounding error of a row of a linear system, relative to the sum of the magnitudes of its terms.
-const ROW_ROUNDING: f64 = 4.0 * f64::EPSILON;
+pub(crate) const ROW_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Which method solves the inequality.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -42,19 +43,23 @@ struct Found {
 
 /// A problem with its unknowns and the factor that is analysed once.
 pub(crate) struct Level<'a> {
-    problem: &'a DiscreteProblem,
-    interior: Interior,
+    /// The problem.
+    pub problem: &'a DiscreteProblem,
+    /// Its unknowns.
+    pub interior: Interior,
     reduce: bool,
+    with_sigma: bool,
     scalar: Option<ScalarFactor>,
 }
 
 impl<'a> Level<'a> {
     /// No work yet.
-    pub fn new(problem: &'a DiscreteProblem, reduce: bool) -> Level<'a> {
+    pub fn new(problem: &'a DiscreteProblem, settings: &Settings) -> Level<'a> {
         Level {
             problem,
             interior: Interior::new(&problem.boundary),
-            reduce,
+            reduce: settings.reduce,
+            with_sigma: settings.sigma,
             scalar: None,
         }
     }
@@ -126,15 +131,16 @@ impl<'a> Level<'a> {
     /// Forces, sigma and the record.
     fn finish(
         &mut self,
-        displacement: [Vec<f64>; 2],
+        mut displacement: [Vec<f64>; 2],
         found: Found,
         reduction: Reduction,
     ) -> Result<Solution, SolveError> {
+        self.uncross(&mut displacement);
         let force = match found.multiplier {
             Some(force) => force,
             None => self.forces(&displacement, &found.contact),
         };
-        let sigma = if force.iter().all(|&z| z == 0.0) {
+        let sigma = if !self.with_sigma || force.iter().all(|&z| z == 0.0) {
             vec![0.0; self.problem.order()]
         } else {
             self.sigma(&force)?
@@ -151,6 +157,10 @@ impl<'a> Level<'a> {
                 2 * n
             },
             kkt_residual: kkt_residual(self.problem, &displacement, &force),
+            algebraic_error: None,
+            contraction: None,
+            first_cycle: None,
+            cycles: None,
         };
         Ok(Solution {
             displacement,
@@ -159,6 +169,19 @@ impl<'a> Level<'a> {
             contact: found.contact,
             info,
         })
+    }
+
+    /// Where rounding has left u1 < u2, both displacements take their mean weighted by stiffness.
+    fn uncross(&self, displacement: &mut [Vec<f64>; 2]) {
+        for j in self.interior.iter() {
+            let [u1, u2] = [displacement[0][j], displacement[1][j]];
+            if u1 < u2 {
+                let share = 1.0 / (1.0 + self.problem.diagonal(1, j) / self.problem.diagonal(0, j));
+                let common = u2 + share * (u1 - u2);
+                displacement[0][j] = common;
+                displacement[1][j] = common;
+            }
+        }
     }
 
     fn take_scalar(&mut self) -> Result<ScalarFactor, SolveError> {
@@ -197,7 +220,7 @@ impl<'a> Level<'a> {
     }
 
     /// What the contact set found says about the model: without contact, or with nothing else, no inequality was left.
-    fn named(&self, contact: &[bool], model: Reduction) -> Reduction {
+    pub fn named(&self, contact: &[bool], model: Reduction) -> Reduction {
         if !contact.contains(&true) {
             Reduction::NoContact
         } else if self.interior.iter().all(|j| contact[j]) && self.shares_boundary() {
@@ -225,7 +248,7 @@ impl<'a> Level<'a> {
     }
 
     /// The Riesz representative: K sigma = z, zero on the boundary.
-    fn sigma(&mut self, force: &[f64]) -> Result<Vec<f64>, SolveError> {
+    pub fn sigma(&mut self, force: &[f64]) -> Result<Vec<f64>, SolveError> {
         let mut factor = self.take_scalar()?;
         factor.whole(&self.problem.laplacian, Role::Laplacian, &self.interior)?;
         let mut rhs: Vec<f64> = self.interior.iter().map(|j| force[j]).collect();

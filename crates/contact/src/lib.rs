@@ -18,6 +18,7 @@ mod interior;
 mod interior_point;
 mod level;
 mod monotone;
+mod multigrid;
 pub mod problem;
 mod reduce;
 pub mod settings;
@@ -29,8 +30,12 @@ mod system;
 pub use error::SolveError;
 pub use problem::{DiscreteProblem, Tensions};
 pub use settings::{Settings, Solver, Tolerance};
-pub use solution::{Reduction, Solution, SolveInfo, Status, kkt_residual, rounding_residual};
-pub use solve::{ACTIVE_SET_LIMIT, INTERIOR_POINT_LIMIT, ROUNDING_LIMIT, solve};
+pub use solution::{
+    Cycles, Reduction, Solution, SolveInfo, Status, kkt_residual, rounding_residual,
+};
+pub use solve::{
+    ACTIVE_SET_LIMIT, INTERIOR_POINT_LIMIT, MULTIGRID_FROM, ROUNDING_LIMIT, add_sigma, solve,
+};
 pub use start::Start;
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use fem_core::assemble::{dual_areas, stiffness};
 use fem_core::integrate::Loads;
+use fem_core::topology::Birth;
 use fem_core::{Mesh, Pattern, SymmetricMatrix};
 
 /// What the two tensions have in common; decides how far the problem reduces.
@@ -41,6 +42,10 @@ pub struct DiscreteProblem {
     pub heights: [Vec<f64>; 2],
     /// Area |D_j| of every vertex's dual cell.
     pub dual_area: Vec<f64>,
+    /// The birth of every vertex: the hierarchy of multigrid.
+    pub genealogy: Arc<[Birth]>,
+    /// The vertices in the order in which the leaves of the mesh touch them first: neighbours stand close.
+    pub along_leaves: Arc<[u32]>,
 }
 
 impl DiscreteProblem {
@@ -64,6 +69,8 @@ impl DiscreteProblem {
             boundary: mesh.boundary().to_vec(),
             heights,
             dual_area: dual_areas(mesh),
+            genealogy: mesh.genealogy().into(),
+            along_leaves: along_leaves(mesh),
             pattern,
         }
     }
@@ -85,6 +92,18 @@ impl DiscreteProblem {
         let (d1, d2) = (self.diagonal(0, vertex), self.diagonal(1, vertex));
         d1 / (1.0 + d1 / d2)
     }
+}
+
+/// The vertices of a mesh in the order of its triangles.
+fn along_leaves(mesh: &Mesh) -> Arc<[u32]> {
+    let mut seen = vec![false; mesh.vertex_count()];
+    let mut order = Vec::with_capacity(mesh.vertex_count());
+    for v in mesh.triangles().iter().flatten() {
+        if !std::mem::replace(&mut seen[v.index()], true) {
+            order.push(v.0);
+        }
+    }
+    order.into()
 }
 
 impl Tensions {

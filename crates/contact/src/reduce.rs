@@ -61,6 +61,12 @@ impl<'a> Proportional<'a> {
         [1.0 / (1.0 + t2 / t1), 1.0 / (1.0 + t1 / t2)]
     }
 
+    /// What the squared norms of mean and gap in the matrix M count in the energy norm of the pair: t_1 + t_2 and t_1 t_2/(t_1 + t_2).
+    pub fn energy_weights(&self) -> [f64; 2] {
+        let [t1, t2] = self.tension;
+        [t1 + t2, t1 / (1.0 + t1 / t2)]
+    }
+
     /// The obstacle problem of the gap.
     pub fn system<'s>(&self, interior: &'s Interior) -> System<'s>
     where

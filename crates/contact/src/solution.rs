@@ -37,12 +37,38 @@ pub struct SolveInfo {
     pub reduction: Reduction,
     /// How it ended.
     pub status: Status,
-    /// Linear solves of the inequality (active set) or interior-point iterations (clarabel); 1 for a problem without inequality.
+    /// Linear solves of the inequality (active set; 1 for a problem without inequality), interior-point iterations (clarabel), or
+    /// cycles of all fields of the model, sigma not among them (multigrid): see [`Cycles`].
     pub iterations: usize,
     /// Size of the algebraic problem: twice the interior vertices, once for full contact.
     pub unknowns: usize,
     /// Relative KKT residual of the iterate that is returned.
     pub kkt_residual: f64,
+    /// Estimate of the energy norm |||.||| of the algebraic error, from the losses of energy of the last cycles; `None` for direct
+    /// solvers, which leave rounding. In a reduced model the mean with weight t_1 + t_2 and the gap with t_1 t_2/(t_1 + t_2) (M
+    /// norm) add up to it.
+    pub algebraic_error: Option<f64>,
+    /// Factor of the energy norm of the algebraic error in a cycle: the largest among the last few, of all fields of the model; `None`
+    /// for direct solvers and where a single cycle was made.
+    pub contraction: Option<f64>,
+    /// Factor of the energy norm of the algebraic error in the first cycle from a start, as later ones showed, here or on an
+    /// earlier mesh (then a little more is assumed); `None` where it is not known.
+    pub first_cycle: Option<f64>,
+    /// Cycles field by field, also where multigrid then handed over; `None` for direct solvers.
+    pub cycles: Option<Cycles>,
+}
+
+/// How many cycles a multigrid solve took.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Cycles {
+    /// Steps of conjugate gradients for the field with the inequality: the gap, or both displacements.
+    pub inequality: usize,
+    /// Monotone cycles for it, from a cold start or where the energy would have risen.
+    pub monotone: usize,
+    /// Steps for the mean of the displacements, in a reduced model.
+    pub mean: usize,
+    /// Steps for sigma.
+    pub sigma: usize,
 }
 
 /// Nodal solution of a [`DiscreteProblem`], one entry a vertex, boundary included.

@@ -2,6 +2,7 @@
 
 use crate::error::SolveError;
 use crate::level::{INTERIOR_POINT, Level, Method};
+use crate::multigrid;
 use crate::problem::DiscreteProblem;
 use crate::settings::{Settings, Solver, Tolerance};
 use crate::solution::{Solution, Status, rounding_residual};
@@ -15,6 +16,9 @@ pub const ACTIVE_SET_LIMIT: f64 = 1e-9;
 /// Below any discretisation error. It reaches 1e-9 to 1e-15 on ordinary data and 1e-7 with a ratio of the tensions of 1e8;
 /// with 1e12 it may fail.
 pub const INTERIOR_POINT_LIMIT: f64 = 1e-6;
+
+/// Number of vertices from which [`Solver::Auto`] takes multigrid.
+pub const MULTIGRID_FROM: usize = 20_000;
 
 /// Where rounding allows no better the limits give way, but never beyond this relative KKT residual.
 pub const ROUNDING_LIMIT: f64 = 1e-3;
@@ -47,12 +51,16 @@ pub fn solve(
     start: Option<&Start>,
 ) -> Result<Solution, SolveError> {
     check(problem, start)?;
-    let mut level = Level::new(problem, settings.reduce);
+    let mut level = Level::new(problem, settings);
     // Without an interior vertex there is nothing to iterate on.
     let trivial = !problem.boundary.contains(&false);
     let solution = match settings.solver {
         Solver::Clarabel if !trivial => level.solve(Method::InteriorPoint, start)?,
         Solver::Clarabel | Solver::ActiveSet => level.solve(Method::ActiveSet, start)?,
+        Solver::Multigrid => by_multigrid(&mut level, settings, start)?,
+        Solver::Auto if problem.order() >= MULTIGRID_FROM => {
+            by_multigrid(&mut level, settings, start)?
+        }
         Solver::Auto => {
             let first = level.solve(Method::ActiveSet, start)?;
             if first.info.status == Status::Converged {
@@ -62,7 +70,92 @@ pub fn solve(
             }
         }
     };
-    judge(problem, solution, settings.tolerance)
+    judge(problem, solution, settings)
+}
+
+/// Computes sigma, K sigma = z, for a solution that was found without it ([`Settings::sigma`]).
+///
+/// # Errors
+/// As [`solve`] from the linear algebra.
+pub fn add_sigma(
+    problem: &DiscreteProblem,
+    settings: &Settings,
+    solution: &mut Solution,
+) -> Result<(), SolveError> {
+    let mut level = Level::new(problem, settings);
+    let iterative = match settings.solver {
+        Solver::Multigrid => true,
+        Solver::Auto => problem.order() >= MULTIGRID_FROM,
+        Solver::ActiveSet | Solver::Clarabel => false,
+    };
+    let found = if iterative {
+        multigrid::sigma(&level, settings, &solution.force).unwrap_or_default()
+    } else {
+        None
+    };
+    solution.sigma = match found {
+        Some(sigma) => sigma,
+        None if solution.force.iter().all(|&z| z == 0.0) => vec![0.0; problem.order()],
+        None => level.sigma(&solution.force)?,
+    };
+    Ok(())
+}
+
+/// Multigrid where there is a hierarchy, and the active set method from its last iterate should it miss its goal.
+fn by_multigrid(
+    level: &mut Level,
+    settings: &Settings,
+    start: Option<&Start>,
+) -> Result<Solution, SolveError> {
+    let mut cycles = None;
+    let again = match multigrid::solve(level, settings, start) {
+        Ok(None) => return level.solve(Method::ActiveSet, start),
+        Ok(Some(mut solution)) if meets(level.problem, &solution, settings) => {
+            if solution.sigma.is_empty() {
+                solution.sigma = level.sigma(&solution.force)?;
+            }
+            return Ok(solution);
+        }
+        Ok(Some(solution)) => {
+            cycles = solution.info.cycles;
+            let finite = solution
+                .displacement
+                .iter()
+                .flatten()
+                .all(|u| u.is_finite());
+            finite.then(|| Start::again(&solution))
+        }
+        // The factor of the initial mesh failed: let the whole matrix say so, or not.
+        Err(_) => None,
+    };
+    let mut solution = level.solve(Method::ActiveSet, again.as_ref().or(start))?;
+    solution.info.cycles = cycles;
+    solution.info.solver = match solution.info.solver {
+        "active-set" => "multigrid+active-set",
+        _ => "multigrid+active-set+monotone",
+    };
+    Ok(solution)
+}
+
+/// Whether a solution by multigrid reached its goal and its KKT residual is within the limit.
+fn meets(problem: &DiscreteProblem, solution: &Solution, settings: &Settings) -> bool {
+    solution.info.status == Status::Converged
+        && (meets_target(solution, settings)
+            || solution.info.kkt_residual <= limit(problem, solution, settings.tolerance))
+}
+
+/// Whether the estimated algebraic error is within a target that was set.
+fn meets_target(solution: &Solution, settings: &Settings) -> bool {
+    match (
+        settings.tolerance,
+        settings.energy_target,
+        solution.info.algebraic_error,
+    ) {
+        (Tolerance::Balanced, Some(target), Some(error)) => {
+            error <= target && solution.info.kkt_residual.is_finite()
+        }
+        _ => false,
+    }
 }
 
 /// Of a solution and a second opinion the one with the smaller KKT residual.
@@ -77,21 +170,14 @@ fn better(first: Solution, second: Result<Solution, SolveError>) -> Solution {
 fn judge(
     problem: &DiscreteProblem,
     mut solution: Solution,
-    tolerance: Tolerance,
+    settings: &Settings,
 ) -> Result<Solution, SolveError> {
     let residual = solution.info.kkt_residual;
-    let tolerance = match tolerance {
-        Tolerance::Relative(t) => t,
-        Tolerance::Balanced => {
-            let limit = if solution.info.solver == INTERIOR_POINT {
-                INTERIOR_POINT_LIMIT
-            } else {
-                ACTIVE_SET_LIMIT
-            };
-            let rounding = rounding_residual(problem, &solution.displacement, &solution.force);
-            limit.max(rounding.min(ROUNDING_LIMIT))
-        }
-    };
+    let converged = solution.info.status == Status::Converged;
+    if converged && meets_target(&solution, settings) {
+        return Ok(solution);
+    }
+    let tolerance = limit(problem, &solution, settings.tolerance);
     if residual.is_finite() && residual <= tolerance {
         solution.info.status = Status::Converged;
         return Ok(solution);
@@ -105,6 +191,22 @@ fn judge(
             other => other,
         },
     })
+}
+
+/// The relative KKT residual that a solution must reach.
+fn limit(problem: &DiscreteProblem, solution: &Solution, tolerance: Tolerance) -> f64 {
+    match tolerance {
+        Tolerance::Relative(t) => t,
+        Tolerance::Balanced => {
+            let limit = if solution.info.solver == INTERIOR_POINT {
+                INTERIOR_POINT_LIMIT
+            } else {
+                ACTIVE_SET_LIMIT
+            };
+            let rounding = rounding_residual(problem, &solution.displacement, &solution.force);
+            limit.max(rounding.min(ROUNDING_LIMIT))
+        }
+    }
 }
 
 fn check(problem: &DiscreteProblem, start: Option<&Start>) -> Result<(), SolveError> {
@@ -215,7 +317,11 @@ mod tests {
             let mut s = solution.clone();
             s.info.kkt_residual = kkt;
             s.info.solver = solver;
-            let judged = judge(&problem, s, tolerance);
+            let settings = Settings {
+                tolerance,
+                ..Settings::default()
+            };
+            let judged = judge(&problem, s, &settings);
             assert_eq!(judged.is_ok(), fine, "{kkt:e} {solver} {tolerance:?}");
             if let Err(SolveError::NotConverged { status, .. }) = judged {
                 assert_eq!(status, Status::Stagnated);

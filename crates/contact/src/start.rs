@@ -13,6 +13,10 @@ pub struct Start {
     pub displacement: [Vec<f64>; 2],
     /// Action forces, where they are known. No solver needs them.
     pub force: Option<Vec<f64>>,
+    /// Riesz representative of the action, where it is known: saves multigrid some cycles.
+    pub sigma: Option<Vec<f64>>,
+    /// What the first multigrid cycle did on earlier meshes ([`crate::SolveInfo::first_cycle`]).
+    pub first_cycle: Option<f64>,
     /// The contact set to begin with.
     pub contact: Vec<bool>,
 }
@@ -28,12 +32,13 @@ impl Start {
         let boundary = mesh.boundary();
         let mut displacement = solution.displacement.clone();
         let mut contact = solution.contact.clone();
-        for field in &mut displacement {
+        let mut sigma = solution.sigma.clone();
+        for field in displacement.iter_mut().chain([&mut sigma]) {
             field.reserve_exact(vertices.saturating_sub(old_vertices));
         }
         for birth in mesh.genealogy().iter().skip(old_vertices) {
             let [a, b] = birth.parents.map(|p| p.index());
-            for field in &mut displacement {
+            for field in displacement.iter_mut().chain([&mut sigma]) {
                 let mean = 0.5 * field[a] + 0.5 * field[b];
                 field.push(mean);
             }
@@ -48,7 +53,20 @@ impl Start {
         Start {
             displacement,
             force: None,
+            sigma: Some(sigma),
+            first_cycle: solution.info.first_cycle,
             contact,
+        }
+    }
+
+    /// The solution itself, to be continued on its own mesh to a higher accuracy.
+    pub fn again(solution: &Solution) -> Start {
+        Start {
+            displacement: solution.displacement.clone(),
+            force: Some(solution.force.clone()),
+            sigma: Some(solution.sigma.clone()),
+            first_cycle: solution.info.first_cycle,
+            contact: solution.contact.clone(),
         }
     }
 }

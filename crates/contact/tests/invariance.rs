@@ -184,6 +184,8 @@ fn senseless_data_are_refused_by_name() {
     let start = Start {
         displacement: [vec![0.0; n], vec![0.0; n]],
         force: None,
+        sigma: None,
+        first_cycle: None,
         contact: vec![false; n - 1],
     };
     assert_eq!(

@@ -290,6 +290,8 @@ fn equal_loads_touch_without_force_and_do_not_flicker() {
                 let start = Start {
                     displacement: s.displacement.clone(),
                     force: None,
+                    sigma: None,
+                    first_cycle: None,
                     contact: s.contact.clone(),
                 };
                 let again = solve(&problem, &settings(reduce), Some(&start)).unwrap();

@@ -49,6 +49,10 @@ pub(crate) fn solution(displacement: [Vec<f64>; 2], force: Vec<f64>, sigma: Vec<
             iterations: 0,
             unknowns: 0,
             kkt_residual: 0.0,
+            algebraic_error: None,
+            contraction: None,
+            first_cycle: None,
+            cycles: None,
         },
     }
 }

@@ -183,7 +183,7 @@ fn solve(top: &Section<'_>) -> Result<Solve, Fault> {
         ("auto", Some(Solver::Auto)),
         ("clarabel", Some(Solver::Clarabel)),
         ("active-set", Some(Solver::ActiveSet)),
-        ("multigrid", None),
+        ("multigrid", Some(Solver::Multigrid)),
     ];
     let reductions = [("auto", Some(true)), ("off", Some(false))];
     let tolerance = section

@@ -56,6 +56,10 @@ impl Reference {
                 iterations: 0,
                 unknowns: 0,
                 kkt_residual: 0.0,
+                algebraic_error: None,
+                contraction: None,
+                first_cycle: None,
+                cycles: None,
             },
         };
         Reference {
