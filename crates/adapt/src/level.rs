@@ -2,14 +2,12 @@
 
 use std::time::Instant;
 
-use contact::{DiscreteProblem, Solution, Start};
-use estimate::certificate::POINCARE;
-use estimate::{Certificate, Energy, Given, Grade, Moments, Paper, TrueErrors, certify, root_sum};
-use fem_core::scale::times_power_of_two;
-use fem_core::{FieldError, Mesh, Scale, TriangleId};
+use contact::{DiscreteProblem, Solution, Start, Tolerance};
+use estimate::{Grade, Moments};
+use fem_core::{Mesh, TriangleId};
 
-use crate::assurance::Assurance;
 use crate::discretise::{discretise, discretise_with_moments};
+use crate::estimates::Estimates;
 use crate::output::memory::peak_memory_mb;
 use crate::problem::Problem;
 use crate::record::LevelRecord;
@@ -35,61 +33,36 @@ pub struct Level {
     pub record: LevelRecord,
 }
 
-/// Indicators and errors of a level, one entry a triangle, scaled.
-#[derive(Clone)]
-pub struct Estimates {
-    /// Indicators of the paper, if wanted.
-    pub paper: Option<Paper>,
-    /// Residual estimator, if wanted.
-    pub residual: Option<Vec<f64>>,
-    /// The certificate, if wanted.
-    pub certificate: Option<Certificate>,
-    /// Data oscillation.
-    pub oscillation: Vec<f64>,
-    /// Errors against the exact solution, if known.
-    pub errors: Option<TrueErrors>,
-    /// Squares that triangles are marked by: the driving estimator and the oscillation.
-    pub marking: Vec<f64>,
-    /// The largest contribution h_K |K|^(1/2) |f_ih| of the loads to the driving estimator, before anything cancels.
-    pub largest_contribution: f64,
-    /// J(u_h) and |||u_h|||.
-    pub energy: Energy,
-    /// What the estimator does not see of the loads, in the unit of the bound: their oscillation, over the root of the tension where
-    /// the energy norm is estimated. The certificate sees everything.
-    pub unseen: f64,
-    /// The number that the run is judged by.
-    pub bound: f64,
+/// Under a balanced tolerance the estimated algebraic error is at most this part of the estimated error, and so is eta_alg
+/// beside eta where a bound is reported as guaranteed.
+pub const BALANCE: f64 = 0.1;
+
+/// How often a level is solved to a higher accuracy before its balance is given up.
+const ROUNDS: usize = 8;
+
+/// What a run knows everywhere.
+#[derive(Clone, Copy)]
+pub(crate) struct Context<'a> {
+    pub problem: &'a Problem,
+    pub settings: &'a Settings,
+    pub begun: Instant,
 }
 
 impl Level {
     /// Solves and estimates on the initial mesh.
-    pub(crate) fn initial(
-        problem: &Problem,
-        settings: &Settings,
-        begun: Instant,
-    ) -> Result<Level, LevelError> {
-        Level::on(
-            problem.mesh.clone(),
-            problem,
-            settings,
-            None,
-            Steps {
-                number: 0,
-                refine: 0.0,
-                begun,
-            },
-        )
+    pub(crate) fn initial(context: Context<'_>) -> Result<Level, LevelError> {
+        let mesh = context.problem.mesh.clone();
+        Level::on(mesh, context, None, 0, 0.0)
     }
 
     /// Refines the marked triangles, carries the solution over, solves and estimates.
     pub(crate) fn refine(
         &self,
         marked: &[TriangleId],
-        problem: &Problem,
-        settings: &Settings,
-        begun: Instant,
+        context: Context<'_>,
     ) -> Result<Level, LevelError> {
-        let start = Instant::now();
+        let settings = context.settings;
+        let clock = Instant::now();
         let mut mesh = self.mesh.clone();
         let children = match settings.mark.strategy {
             Strategy::Uniform => Children::Four,
@@ -97,69 +70,25 @@ impl Level {
         };
         let refinement = mesh.refine(marked, children)?;
         let carried = Start::prolong(&self.solution, &mesh, refinement.old_vertices);
-        let steps = Steps {
-            number: self.number + 1,
-            refine: start.elapsed().as_secs_f64(),
-            begun,
-        };
-        Level::on(mesh, problem, settings, Some(carried), steps)
+        // First-order elements: the error goes like the root of the number of vertices at best.
+        let growth = self.mesh.vertex_count() as f64 / mesh.vertex_count() as f64;
+        let expected = self.estimates.error_size.map(|size| size * growth.sqrt());
+        let seconds = clock.elapsed().as_secs_f64();
+        let before = Some((carried, expected));
+        Level::on(mesh, context, before, self.number + 1, seconds)
     }
 
-    /// Replaces the certificate of this level by the sharp one, and the bound with it where the certificate drives the run.
-    ///
-    /// Returns the quotient of the sharp bound and the one before; 1 where both vanish.
-    pub(crate) fn sharpen(
-        &mut self,
-        problem: &Problem,
-        settings: &Settings,
-        begun: Instant,
-    ) -> Result<f64, LevelError> {
-        let clock = Instant::now();
-        let Some(moments) = &self.moments else {
-            return Ok(1.0);
-        };
-        let sharp = certified(
-            &self.mesh,
-            &self.discrete,
-            moments,
-            &self.solution,
-            problem,
-            Grade::Rt1,
-        )?;
-        let estimates = &mut self.estimates;
-        let before = estimates.certificate.as_ref().map_or(0.0, |c| c.bound);
-        let ratio = if before > 0.0 {
-            sharp.bound / before
-        } else {
-            1.0
-        };
-        if settings.estimate.estimator == Estimator::Certified {
-            estimates.bound = sharp.bound;
-        }
-        estimates.certificate = Some(sharp);
-        let (mesh, discrete, solution) = (&self.mesh, &self.discrete, &self.solution);
-        let new = record(mesh, discrete, solution, estimates, problem, settings)?;
-        let old = &mut self.record;
-        old.certified = new.certified;
-        old.eta_alg = new.eta_alg;
-        old.assurance = new.assurance;
-        old.error_bound = new.error_bound;
-        old.bound_kind = new.bound_kind;
-        old.relative_bound = new.relative_bound;
-        old.effectivity = new.effectivity;
-        old.seconds_estimate += clock.elapsed().as_secs_f64();
-        old.seconds_total = begun.elapsed().as_secs_f64();
-        old.peak_memory_mb = peak_memory_mb();
-        Ok(ratio)
-    }
-
+    /// Solves and estimates on a mesh; `before` is the solution carried over from the level before and the error to be expected.
     fn on(
         mesh: Mesh,
-        problem: &Problem,
-        settings: &Settings,
-        carried: Option<Start>,
-        steps: Steps,
+        context: Context<'_>,
+        before: Option<(Start, Option<f64>)>,
+        number: usize,
+        seconds_refine: f64,
     ) -> Result<Level, LevelError> {
+        let Context {
+            problem, settings, ..
+        } = context;
         let clock = Instant::now();
         let (discrete, moments) = if settings.estimate.wants(Estimator::Certified) {
             let (discrete, moments) = discretise_with_moments(problem, &mesh)?;
@@ -167,10 +96,19 @@ impl Level {
         } else {
             (discretise(problem, &mesh)?, None)
         };
-        let assemble = clock.elapsed().as_secs_f64();
+        let seconds_assemble = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let solution = contact::solve(&discrete, &settings.solve, carried.as_ref())?;
-        let solve = clock.elapsed().as_secs_f64();
+        let (start, expected) = match before {
+            Some((start, expected)) => (Some(start), expected),
+            None => (None, None),
+        };
+        let solve = contact::Settings {
+            energy_target: expected.map(|size| BALANCE * size),
+            sigma: needs_sigma(problem, settings),
+            ..settings.solve
+        };
+        let solution = contact::solve(&discrete, &solve, start.as_ref())?;
+        let seconds_solve = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let estimates = Estimates::of(
             &mesh,
@@ -180,271 +118,157 @@ impl Level {
             problem,
             settings,
         )?;
-        let mut record = record(&mesh, &discrete, &solution, &estimates, problem, settings)?;
-        record.level = steps.number;
-        record.seconds_refine = steps.refine;
-        record.seconds_assemble = assemble;
-        record.seconds_solve = solve;
+        let mut record =
+            LevelRecord::of(&mesh, &discrete, &solution, &estimates, problem, settings)?;
+        record.level = number;
+        record.seconds_refine = seconds_refine;
+        record.seconds_assemble = seconds_assemble;
+        record.seconds_solve = seconds_solve;
         record.seconds_estimate = clock.elapsed().as_secs_f64();
-        record.seconds_total = steps.begun.elapsed().as_secs_f64();
-        record.peak_memory_mb = peak_memory_mb();
-        Ok(Level {
-            number: steps.number,
+        let mut level = Level {
+            number,
             mesh,
             discrete,
             moments,
             solution,
             estimates,
             record,
-        })
+        };
+        level.balance(context, |estimates, algebraic| {
+            let size = estimates.error_size?;
+            (algebraic > BALANCE * size).then_some(BALANCE * size)
+        })?;
+        level.stamp(context);
+        Ok(level)
     }
-}
 
-/// What a level inherits from the step that led to it.
-struct Steps {
-    number: usize,
-    refine: f64,
-    begun: Instant,
-}
-
-impl Estimates {
-    fn of(
-        mesh: &Mesh,
-        discrete: &DiscreteProblem,
-        moments: Option<&Moments>,
-        solution: &Solution,
-        problem: &Problem,
-        settings: &Settings,
-    ) -> Result<Estimates, LevelError> {
-        let wants = |e| settings.estimate.wants(e);
-        let paper = wants(Estimator::Paper).then(|| estimate::paper(mesh, discrete, solution));
-        let residual =
-            wants(Estimator::Residual).then(|| estimate::residual(mesh, discrete, solution));
-        let oscillation = estimate::oscillation(mesh, discrete);
-        let errors = match &problem.exact {
-            Some(exact) => Some(estimate::true_errors(
-                mesh,
-                discrete,
-                solution,
-                exact,
-                &problem.tension,
-            )?),
-            None => None,
-        };
-        let certificate = match moments {
-            Some(moments) => Some(certified(
-                mesh,
-                discrete,
-                moments,
-                solution,
-                problem,
-                Grade::Rt0,
-            )?),
-            None => None,
-        };
-        let weighted = settings.estimate.estimator != Estimator::Paper;
-        let seen = settings.estimate.estimator == Estimator::Certified;
-        let unseen: Vec<f64> = (0..mesh.triangle_count())
-            .map(|t| {
-                if seen {
-                    return 0.0;
-                }
-                let h = mesh.shape(TriangleId(t as u32)).diameter();
-                let part = |i: usize| {
-                    discrete.loads[i].deviation_squared[t]
-                        / tension_weight(discrete, i, t, weighted)
-                };
-                h * h * (part(0) + part(1))
-            })
-            .collect();
-        // The driving estimator was asked for, so it is there.
-        let driving: &[f64] = match settings.estimate.estimator {
-            Estimator::Paper => paper.as_ref().map_or(&[], |p| &p.eta_k),
-            Estimator::Residual => residual.as_deref().unwrap_or_default(),
-            Estimator::Certified => certificate.as_ref().map_or(&[], |c| &c.local),
-        };
-        let marking: Vec<f64> = driving
-            .iter()
-            .zip(&unseen)
-            .map(|(e, o)| e * e + o)
-            .collect();
-        let unseen = unseen.iter().sum::<f64>().sqrt();
-        let bound = match settings.estimate.estimator {
-            Estimator::Paper => marking.iter().sum::<f64>().sqrt(),
-            Estimator::Residual => root_sum(driving),
-            Estimator::Certified => certificate.as_ref().map_or(0.0, |c| c.bound),
-        };
-        let mut largest = 0.0f64;
-        for t in mesh.triangle_ids() {
-            let shape = mesh.shape(t);
-            let weight = shape.diameter().powi(2) * shape.area;
-            let square = [0, 1].map(|i| {
-                let mean = discrete.loads[i].mean[t.index()];
-                weight * mean * mean / tension_weight(discrete, i, t.index(), weighted)
-            });
-            largest = largest.max(square[0] + square[1]);
+    /// Solves on to a higher accuracy as long as `target` wants one: it is shown the estimates and the estimated algebraic error, and tells
+    /// the algebraic error to go for. Nothing is done for direct solvers, or where the user chose the tolerance.
+    fn balance(
+        &mut self,
+        context: Context<'_>,
+        target: impl Fn(&Estimates, f64) -> Option<f64>,
+    ) -> Result<(), LevelError> {
+        let Context {
+            problem, settings, ..
+        } = context;
+        if settings.solve.tolerance != Tolerance::Balanced {
+            return Ok(());
         }
-        Ok(Estimates {
-            paper,
-            residual,
-            certificate,
-            oscillation,
-            errors,
-            marking,
-            unseen,
-            largest_contribution: largest.sqrt(),
-            energy: estimate::energy(mesh, discrete, solution),
-            bound,
-        })
+        for _ in 0..ROUNDS {
+            let Some(algebraic) = self.solution.info.algebraic_error else {
+                return Ok(());
+            };
+            let Some(goal) = target(&self.estimates, algebraic) else {
+                return Ok(());
+            };
+            let clock = Instant::now();
+            let solve = contact::Settings {
+                energy_target: Some(goal),
+                sigma: needs_sigma(problem, settings),
+                ..settings.solve
+            };
+            let start = Start::again(&self.solution);
+            let mut better = contact::solve(&self.discrete, &solve, Some(&start))?;
+            better.info.iterations += self.solution.info.iterations;
+            self.solution = better;
+            self.record.seconds_solve += clock.elapsed().as_secs_f64();
+            let clock = Instant::now();
+            self.estimates = Estimates::of(
+                &self.mesh,
+                &self.discrete,
+                self.moments.as_ref(),
+                &self.solution,
+                problem,
+                settings,
+            )?;
+            self.renew(context)?;
+            self.record.seconds_estimate += clock.elapsed().as_secs_f64();
+        }
+        Ok(())
     }
-}
 
-/// The tension that the squares of an estimator of the energy norm are divided by; 1 for the paper's.
-fn tension_weight(
-    discrete: &DiscreteProblem,
-    membrane: usize,
-    triangle: usize,
-    weighted: bool,
-) -> f64 {
-    if weighted {
-        discrete.tension_mean[membrane][triangle]
-    } else {
-        1.0
+    /// Iterates until eta_alg too is a small part of the certificate; for a level that may be the last.
+    pub(crate) fn settle(&mut self, context: Context<'_>) -> Result<(), LevelError> {
+        self.balance(context, |estimates, algebraic| {
+            let certificate = estimates.certificate.as_ref()?;
+            let share = BALANCE * certificate.eta;
+            // eta_alg falls with the algebraic error.
+            (certificate.algebraic > share).then(|| 0.8 * algebraic * share / certificate.algebraic)
+        })?;
+        self.stamp(context);
+        Ok(())
     }
-}
 
-/// Puts the scale back: the numbers of a level in the user's units.
-fn record(
-    mesh: &Mesh,
-    discrete: &DiscreteProblem,
-    solution: &Solution,
-    estimates: &Estimates,
-    problem: &Problem,
-    settings: &Settings,
-) -> Result<LevelRecord, LevelError> {
-    let scale = problem.scale;
-    let by = times_power_of_two;
-    let bound_exponent = bound_unit(settings.estimate.estimator, scale);
-    let certificate = estimates.certificate.as_ref();
-    let bound_kind = match settings.estimate.estimator {
-        Estimator::Certified => match certificate.map(|c| c.grade) {
-            Some(Grade::Rt1) => "rt1",
-            _ => "rt0",
-        },
-        Estimator::Residual => "residual",
-        Estimator::Paper => "paper",
-    };
-    let Energy {
-        energy,
-        energy_norm: norm,
-    } = estimates.energy;
-    // A quotient of different units; the exponents are joined first, so that neither number can leave the range.
-    let over = |number: f64| {
-        (number != 0.0).then(|| {
-            by(
-                estimates.bound / number,
-                bound_exponent - scale.energy_norm(),
-            )
-        })
-    };
-    let in_contact = || (0..mesh.vertex_count()).filter(|&j| solution.contact[j]);
-    let pressures = (0..mesh.vertex_count()).map(|j| solution.force[j] / discrete.dual_area[j]);
-    let errors = estimates.errors.as_ref();
-    let assurance = match certificate {
-        Some(certificate) => Some(Assurance::of(
+    /// Replaces the certificate of this level by the sharp one, and the bound with it where the certificate drives the run.
+    ///
+    /// Returns the quotient of the sharp bound and the one before; 1 where both vanish.
+    pub(crate) fn sharpen(&mut self, context: Context<'_>) -> Result<f64, LevelError> {
+        let Context {
+            problem, settings, ..
+        } = context;
+        let Some(moments) = &self.moments else {
+            return Ok(1.0);
+        };
+        let clock = Instant::now();
+        let (mesh, discrete, solution) = (&self.mesh, &self.discrete, &self.solution);
+        let ratio = self.estimates.certify(
             mesh,
-            &discrete.tension_mean,
+            discrete,
+            moments,
+            solution,
             problem,
-            certificate,
-        )?),
-        None => None,
-    };
-    Ok(LevelRecord {
-        level: 0,
-        vertices: mesh.vertex_count(),
-        triangles: mesh.triangle_count(),
-        unknowns: solution.info.unknowns,
-        contact_vertices: in_contact().count(),
-        contact_area: by(
-            in_contact()
-                .map(|j| discrete.dual_area[j])
-                .fold(0.0, |a, b| a + b),
-            scale.area(),
-        ),
-        energy: by(energy, scale.energy()),
-        energy_norm: by(norm, scale.energy_norm()),
-        eta_k: estimates
-            .paper
-            .as_ref()
-            .map(|p| by(p.eta_k_total(), scale.force())),
-        eta_e_sum: estimates
-            .paper
-            .as_ref()
-            .map(|p| by(p.eta_e_sum(), scale.force())),
-        residual: estimates
-            .residual
-            .as_ref()
-            .map(|r| by(root_sum(r), scale.energy_norm())),
-        oscillation: by(root_sum(&estimates.oscillation), scale.force()),
-        error_bound: by(estimates.bound, bound_exponent),
-        bound_kind,
-        relative_bound: over(norm),
-        true_error: errors.map(|e| by(e.energy, scale.energy_norm())),
-        effectivity: errors.and_then(|e| over(e.energy)),
-        sigma_error: errors.and_then(|e| e.sigma).map(|s| by(s, scale.force())),
-        h1_error: errors.map(|e| by(e.h1_total, scale.displacement())),
-        solver: solution.info.solver,
-        reduction: solution.info.reduction,
-        iterations: solution.info.iterations,
-        kkt_residual: solution.info.kkt_residual,
-        contact_force: by(solution.force.iter().fold(0.0, |a, b| a + b), scale.force()),
-        max_action: by(pressures.fold(0.0, f64::max), scale.load),
-        smallest_gap: by(
-            (0..mesh.vertex_count())
-                .map(|j| solution.gap(j))
-                .fold(f64::INFINITY, f64::min),
-            scale.displacement(),
-        ),
-        seconds_refine: 0.0,
-        seconds_assemble: 0.0,
-        seconds_solve: 0.0,
-        seconds_estimate: 0.0,
-        seconds_total: 0.0,
-        peak_memory_mb: None,
-        certified: certificate.map(|c| by(c.bound, scale.energy_norm())),
-        eta_alg: certificate.map(|c| by(c.algebraic, scale.energy_norm())),
-        assurance,
-    })
-}
+            Grade::Rt1,
+            settings.estimate.estimator == Estimator::Certified,
+        )?;
+        self.renew(context)?;
+        self.record.seconds_estimate += clock.elapsed().as_secs_f64();
+        self.stamp(context);
+        Ok(ratio)
+    }
 
-/// Exponent of the unit of an estimator.
-pub(crate) fn bound_unit(estimator: Estimator, scale: Scale) -> i32 {
-    match estimator {
-        Estimator::Certified | Estimator::Residual => scale.energy_norm(),
-        Estimator::Paper => scale.force(),
+    /// Computes sigma if it was left out; before fields are written.
+    pub(crate) fn complete(&mut self, context: Context<'_>) -> Result<(), LevelError> {
+        if needs_sigma(context.problem, context.settings) {
+            return Ok(());
+        }
+        let clock = Instant::now();
+        contact::add_sigma(&self.discrete, &context.settings.solve, &mut self.solution)?;
+        self.record.seconds_solve += clock.elapsed().as_secs_f64();
+        self.stamp(context);
+        Ok(())
+    }
+
+    /// Makes the record anew but for what the clock says.
+    fn renew(&mut self, context: Context<'_>) -> Result<(), LevelError> {
+        let old = &self.record;
+        self.record = LevelRecord {
+            level: old.level,
+            seconds_refine: old.seconds_refine,
+            seconds_assemble: old.seconds_assemble,
+            seconds_solve: old.seconds_solve,
+            seconds_estimate: old.seconds_estimate,
+            ..LevelRecord::of(
+                &self.mesh,
+                &self.discrete,
+                &self.solution,
+                &self.estimates,
+                context.problem,
+                context.settings,
+            )?
+        };
+        Ok(())
+    }
+
+    /// Notes the time and the memory.
+    fn stamp(&mut self, context: Context<'_>) {
+        self.record.seconds_total = context.begun.elapsed().as_secs_f64();
+        self.record.peak_memory_mb = peak_memory_mb();
     }
 }
 
-/// The certificate of a solution of a problem.
-///
-/// # Errors
-/// A value of a load or a tension that is not finite.
-fn certified(
-    mesh: &Mesh,
-    discrete: &DiscreteProblem,
-    moments: &Moments,
-    solution: &Solution,
-    problem: &Problem,
-    grade: Grade,
-) -> Result<Certificate, FieldError> {
-    let given = Given {
-        mesh,
-        load: [&*problem.load[0], &*problem.load[1]],
-        tension: [&*problem.tension[0], &*problem.tension[1]],
-        moments,
-        tension_mean: &discrete.tension_mean,
-        displacement: &solution.displacement,
-        force: &solution.force,
-    };
-    certify(&given, grade, POINCARE)
+/// Whether an estimate of every level needs sigma.
+fn needs_sigma(problem: &Problem, settings: &Settings) -> bool {
+    let known = problem.exact.as_ref().is_some_and(|e| e.sigma.is_some());
+    settings.estimate.wants(Estimator::Paper) || known
 }

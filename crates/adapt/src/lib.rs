@@ -3,6 +3,7 @@
 //! - [`mod@run`]: the loop itself, its reasons to stop and the [`Observer`] trait;
 //! - [`level`]: one level: mesh, discrete problem, solution, estimates, and the step to the next;
 //! - [`mod@discretise`]: from the data to the discrete problem on a mesh;
+//! - [`estimates`]: indicators, errors and bounds of a level;
 //! - [`assurance`]: what the certificate holds for, in words;
 //! - [`mod@mark`]: which triangles are refined;
 //! - [`problem`], [`settings`]: what goes in; [`record`]: the numbers that come out of a level;
@@ -10,6 +11,7 @@
 
 pub mod assurance;
 pub mod discretise;
+pub mod estimates;
 pub mod level;
 pub mod mark;
 pub mod output;
@@ -21,7 +23,8 @@ pub mod settings;
 
 pub use assurance::Assurance;
 pub use discretise::{DataError, discretise, discretise_with_moments};
-pub use level::{Estimates, Level};
+pub use estimates::Estimates;
+pub use level::Level;
 pub use mark::mark;
 pub use problem::Problem;
 pub use record::LevelRecord;

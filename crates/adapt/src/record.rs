@@ -1,8 +1,15 @@
 //! The numbers of one level: a row of the history, in the user's units.
 
-use contact::Reduction;
+use contact::{DiscreteProblem, Reduction, Solution};
+use estimate::{Energy, Grade, root_sum};
+use fem_core::Mesh;
+use fem_core::scale::times_power_of_two;
 
 use crate::assurance::Assurance;
+use crate::estimates::{Estimates, bound_unit};
+use crate::problem::Problem;
+use crate::run::LevelError;
+use crate::settings::{Estimator, Settings};
 
 /// One level of a run. `None` does not apply. Units: see the field's formula in terms of lengths, tensions and loads;
 /// numbers are those of the user's units, the scale is already put back.
@@ -78,4 +85,110 @@ pub struct LevelRecord {
     pub seconds_total: f64,
     /// Peak resident memory so far, in MiB; none where the system does not tell.
     pub peak_memory_mb: Option<f64>,
+}
+
+impl LevelRecord {
+    /// Puts the scale back: the numbers of a level in the user's units; its number, times and memory are left empty.
+    pub(crate) fn of(
+        mesh: &Mesh,
+        discrete: &DiscreteProblem,
+        solution: &Solution,
+        estimates: &Estimates,
+        problem: &Problem,
+        settings: &Settings,
+    ) -> Result<LevelRecord, LevelError> {
+        let scale = problem.scale;
+        let by = times_power_of_two;
+        let bound_exponent = bound_unit(settings.estimate.estimator, scale);
+        let certificate = estimates.certificate.as_ref();
+        let bound_kind = match settings.estimate.estimator {
+            Estimator::Certified => match certificate.map(|c| c.grade) {
+                Some(Grade::Rt1) => "rt1",
+                _ => "rt0",
+            },
+            Estimator::Residual => "residual",
+            Estimator::Paper => "paper",
+        };
+        let Energy {
+            energy,
+            energy_norm: norm,
+        } = estimates.energy;
+        // A quotient of different units; the exponents are joined first, so that neither number can leave the range.
+        let over = |number: f64| {
+            (number != 0.0).then(|| {
+                by(
+                    estimates.bound / number,
+                    bound_exponent - scale.energy_norm(),
+                )
+            })
+        };
+        let in_contact = || (0..mesh.vertex_count()).filter(|&j| solution.contact[j]);
+        let pressures = (0..mesh.vertex_count()).map(|j| solution.force[j] / discrete.dual_area[j]);
+        let errors = estimates.errors.as_ref();
+        let assurance = match certificate {
+            Some(certificate) => Some(Assurance::of(
+                mesh,
+                &discrete.tension_mean,
+                problem,
+                certificate,
+            )?),
+            None => None,
+        };
+        Ok(LevelRecord {
+            level: 0,
+            vertices: mesh.vertex_count(),
+            triangles: mesh.triangle_count(),
+            unknowns: solution.info.unknowns,
+            contact_vertices: in_contact().count(),
+            contact_area: by(
+                in_contact()
+                    .map(|j| discrete.dual_area[j])
+                    .fold(0.0, |a, b| a + b),
+                scale.area(),
+            ),
+            energy: by(energy, scale.energy()),
+            energy_norm: by(norm, scale.energy_norm()),
+            eta_k: estimates
+                .paper
+                .as_ref()
+                .map(|p| by(p.eta_k_total(), scale.force())),
+            eta_e_sum: estimates
+                .paper
+                .as_ref()
+                .map(|p| by(p.eta_e_sum(), scale.force())),
+            residual: estimates
+                .residual
+                .as_ref()
+                .map(|r| by(root_sum(r), scale.energy_norm())),
+            oscillation: by(root_sum(&estimates.oscillation), scale.force()),
+            error_bound: by(estimates.bound, bound_exponent),
+            bound_kind,
+            relative_bound: over(norm),
+            true_error: errors.map(|e| by(e.energy, scale.energy_norm())),
+            effectivity: errors.and_then(|e| over(e.energy)),
+            sigma_error: errors.and_then(|e| e.sigma).map(|s| by(s, scale.force())),
+            h1_error: errors.map(|e| by(e.h1_total, scale.displacement())),
+            solver: solution.info.solver,
+            reduction: solution.info.reduction,
+            iterations: solution.info.iterations,
+            kkt_residual: solution.info.kkt_residual,
+            contact_force: by(solution.force.iter().fold(0.0, |a, b| a + b), scale.force()),
+            max_action: by(pressures.fold(0.0, f64::max), scale.load),
+            smallest_gap: by(
+                (0..mesh.vertex_count())
+                    .map(|j| solution.gap(j))
+                    .fold(f64::INFINITY, f64::min),
+                scale.displacement(),
+            ),
+            seconds_refine: 0.0,
+            seconds_assemble: 0.0,
+            seconds_solve: 0.0,
+            seconds_estimate: 0.0,
+            seconds_total: 0.0,
+            peak_memory_mb: None,
+            certified: certificate.map(|c| by(c.bound, scale.energy_norm())),
+            eta_alg: certificate.map(|c| by(c.algebraic, scale.energy_norm())),
+            assurance,
+        })
+    }
 }

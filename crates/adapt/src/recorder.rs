@@ -75,15 +75,6 @@ impl Recorder {
         Ok(summary.to_json())
     }
 
-    fn wants_fields(&self, level: usize, last: bool) -> bool {
-        match self.output.fields {
-            Fields::All => true,
-            Fields::Last => last,
-            Fields::None => false,
-            Fields::Every(n) => last || level.is_multiple_of(n),
-        }
-    }
-
     fn write_fields(&mut self, level: &Level) -> Result<(), OutputError> {
         if self.written == Some(level.number) {
             return Ok(());
@@ -143,7 +134,7 @@ impl Observer for Recorder {
             }
             this.levels.push(level.record.clone());
             this.folder.write_history(&this.levels)?;
-            if this.wants_fields(level.number, last.is_some()) {
+            if this.output.wants_fields(level.number, last.is_some()) {
                 this.write_fields(level)?;
             }
             Ok(())

@@ -7,11 +7,12 @@ use fem_core::scale::times_power_of_two;
 use fem_core::{FieldError, MeshError, Scale};
 
 use crate::discretise::DataError;
-use crate::level::{Level, bound_unit};
+use crate::estimates::bound_unit;
+use crate::level::{Context, Level};
 use crate::mark::mark;
 use crate::output::OutputError;
 use crate::problem::Problem;
-use crate::settings::{Estimator, Final, Settings, Stop};
+use crate::settings::{Estimator, Final, Settings};
 
 /// Runs solve, estimate, mark and refine until a rule of `settings.stop` holds.
 ///
@@ -26,48 +27,65 @@ pub fn run(
     settings: &Settings,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, RunError> {
-    let begun = Instant::now();
+    let context = Context {
+        problem,
+        settings,
+        begun: Instant::now(),
+    };
     let failed = |level: usize| move |cause: LevelError| RunError { level, cause };
-    let mut level = Level::initial(problem, settings, begun).map_err(failed(0))?; // SOLVE, ESTIMATE
+    let mut level = Level::initial(context).map_err(failed(0))?; // SOLVE, ESTIMATE
     let mut sharpness = SHARPNESS;
     loop {
-        let mut reason = reached(&settings.stop, settings, &level, problem.scale, 1.0);
-        // The sharp certificate belongs to the last level; it also decides whether this is the last one when the goal is near.
-        let sharp =
-            settings.estimate.wants(Estimator::Certified) && settings.estimate.last == Final::Sharp;
-        let near = || {
-            settings.estimate.estimator == Estimator::Certified
-                && reached(&settings.stop, settings, &level, problem.scale, sharpness).is_some()
-        };
-        if sharp && (reason.is_some() || near()) {
-            sharpness = level
-                .sharpen(problem, settings, begun)
-                .map_err(failed(level.number))?;
-            reason = reached(&settings.stop, settings, &level, problem.scale, 1.0);
+        let number = level.number;
+        let reason = finish(&mut level, context, &mut sharpness).map_err(failed(number))?;
+        if settings.output.wants_fields(number, reason.is_some()) {
+            level.complete(context).map_err(failed(number))?;
         }
-        observer.level(&level, reason).map_err(|e| RunError {
-            level: level.number,
-            cause: e.into(),
-        })?;
+        observer
+            .level(&level, reason)
+            .map_err(|e| failed(number)(e.into()))?;
         if let Some(reason) = reason {
             return Ok(Outcome { reason, level });
         }
         let marked = mark(&level.estimates.marking, &settings.mark); // MARK
-        level = match level.refine(&marked, problem, settings, begun) {
+        level = match level.refine(&marked, context) {
             // REFINE, SOLVE, ESTIMATE
             Ok(next) => next,
             Err(cause) => {
-                observer.failed(&level).map_err(|e| RunError {
-                    level: level.number,
-                    cause: e.into(),
-                })?;
-                return Err(RunError {
-                    level: level.number + 1,
-                    cause,
-                });
+                level.complete(context).map_err(failed(number))?;
+                observer
+                    .failed(&level)
+                    .map_err(|e| failed(number)(e.into()))?;
+                return Err(failed(number + 1)(cause));
             }
         };
     }
+}
+
+/// Whether a level is the last one; if it is, or may be, its certificate is made as good as the mesh allows.
+///
+/// `sharpness` is the quotient of the sharp certificate and the fast one that was seen last.
+fn finish(
+    level: &mut Level,
+    context: Context<'_>,
+    sharpness: &mut f64,
+) -> Result<Option<Reason>, LevelError> {
+    let settings = context.settings;
+    let reason = |level: &Level, bound: f64| reached(settings, level, context.problem.scale, bound);
+    if !settings.estimate.wants(Estimator::Certified) {
+        return Ok(reason(level, level.estimates.bound));
+    }
+    let drives = settings.estimate.estimator == Estimator::Certified;
+    let sharp = settings.estimate.last == Final::Sharp;
+    let factor = if drives && sharp { *sharpness } else { 1.0 };
+    if reason(level, factor * level.estimates.reachable).is_none() {
+        return Ok(None);
+    }
+    level.settle(context)?;
+    if sharp {
+        *sharpness = level.sharpen(context)?;
+    }
+    Ok(reason(level, level.estimates.bound))
 }
 
 /// Watches a run: history, files, progress.
@@ -178,14 +196,9 @@ const ROUNDING_SHARE: f64 = 1e-12;
 /// Quotient of the sharp certificate and the fast one that is expected before one has been seen: the largest measured.
 const SHARPNESS: f64 = 0.9;
 
-/// The first rule that would hold on a level whose bound is `factor` times what it is.
-fn reached(
-    stop: &Stop,
-    settings: &Settings,
-    level: &Level,
-    scale: Scale,
-    factor: f64,
-) -> Option<Reason> {
+/// The first rule that would hold on a level with this bound.
+fn reached(settings: &Settings, level: &Level, scale: Scale, bound: f64) -> Option<Reason> {
+    let stop = &settings.stop;
     let record = &level.record;
     let unit = bound_unit(settings.estimate.estimator, scale);
     let estimates = &level.estimates;
@@ -193,7 +206,7 @@ fn reached(
     // Compared in the unit of the bound, so that neither side leaves the range of double precision.
     let norm = times_power_of_two(estimates.energy.energy_norm, scale.energy_norm() - unit);
     // A load that the mesh does not resolve is no part of the bound, so it must meet the goal by itself.
-    let within = |limit: f64| factor * estimates.bound <= limit && estimates.unseen <= limit;
+    let within = |limit: f64| bound <= limit && estimates.unseen <= limit;
     let relative = stop
         .relative_error
         .is_some_and(|goal| within(goal * norm + floor));

@@ -99,6 +99,18 @@ pub struct Output {
     pub edges: bool,
 }
 
+impl Output {
+    /// Whether a level gets a file of fields.
+    pub fn wants_fields(&self, level: usize, last: bool) -> bool {
+        match self.fields {
+            Fields::All => true,
+            Fields::Last => last,
+            Fields::None => false,
+            Fields::Every(n) => last || level.is_multiple_of(n),
+        }
+    }
+}
+
 /// Settings of a run.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Settings {

@@ -88,6 +88,18 @@ pub struct Certificate {
     pub jumps: usize,
 }
 
+impl Certificate {
+    /// What (B1) would be if the rows held to rounding.
+    pub fn without_algebraic(&self) -> f64 {
+        bound(self.eta, self.contact)
+    }
+}
+
+/// (B1).
+fn bound(eta: f64, contact: f64) -> f64 {
+    0.5 * eta + (0.25 * eta * eta + contact).sqrt()
+}
+
 /// Certifies a discrete solution, or any other pair that does not penetrate; O(N).
 ///
 /// `poincare` divides h_K in C_K, [`POINCARE`] or pi.
@@ -147,14 +159,13 @@ fn summed(
     let low = [0, 1].map(|i| moments.stiffness_low[i].least());
     let eta = square.sqrt();
     let algebraic = shares.algebraic(mesh, low);
-    let half = 0.5 * (eta + algebraic);
     Ok(Certificate {
         grade,
         local,
         eta,
         contact,
         algebraic,
-        bound: half + (half * half + contact).sqrt(),
+        bound: bound(eta + algebraic, contact),
         jumps: moments.jumps,
     })
 }

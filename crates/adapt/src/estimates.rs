@@ -1,0 +1,228 @@
+//! Indicators, errors and bounds of a level.
+
+use contact::{DiscreteProblem, Solution};
+use estimate::certificate::POINCARE;
+use estimate::{Certificate, Energy, Given, Grade, Moments, Paper, TrueErrors, certify, root_sum};
+use fem_core::{FieldError, Mesh, Scale, TriangleId};
+
+use crate::problem::Problem;
+use crate::run::LevelError;
+use crate::settings::{Estimator, Settings};
+
+/// Indicators and errors of a level, one entry a triangle, scaled.
+#[derive(Clone)]
+pub struct Estimates {
+    /// Indicators of the paper, if wanted.
+    pub paper: Option<Paper>,
+    /// Residual estimator, if wanted.
+    pub residual: Option<Vec<f64>>,
+    /// The certificate, if wanted.
+    pub certificate: Option<Certificate>,
+    /// Data oscillation.
+    pub oscillation: Vec<f64>,
+    /// Errors against the exact solution, if known.
+    pub errors: Option<TrueErrors>,
+    /// Squares that triangles are marked by: the driving estimator and the oscillation.
+    pub marking: Vec<f64>,
+    /// The largest contribution h_K |K|^(1/2) |f_ih| of the loads to the driving estimator, before anything cancels.
+    pub largest_contribution: f64,
+    /// J(u_h) and |||u_h|||.
+    pub energy: Energy,
+    /// What the estimator does not see of the loads, in the unit of the bound: their oscillation, over the root of the tension where
+    /// the energy norm is estimated. The certificate sees everything.
+    pub unseen: f64,
+    /// The number that the run is judged by.
+    pub bound: f64,
+    /// What the bound would be without eta_alg: within reach of the solver on this mesh.
+    pub reachable: f64,
+    /// The size of the energy error as far as the estimators tell; the certificate's eta, or a fifth of the residual estimator.
+    pub error_size: Option<f64>,
+}
+
+impl Estimates {
+    pub(crate) fn of(
+        mesh: &Mesh,
+        discrete: &DiscreteProblem,
+        moments: Option<&Moments>,
+        solution: &Solution,
+        problem: &Problem,
+        settings: &Settings,
+    ) -> Result<Estimates, LevelError> {
+        let wants = |e| settings.estimate.wants(e);
+        let paper = wants(Estimator::Paper).then(|| estimate::paper(mesh, discrete, solution));
+        let residual =
+            wants(Estimator::Residual).then(|| estimate::residual(mesh, discrete, solution));
+        let oscillation = estimate::oscillation(mesh, discrete);
+        let errors = match &problem.exact {
+            Some(exact) => Some(estimate::true_errors(
+                mesh,
+                discrete,
+                solution,
+                exact,
+                &problem.tension,
+            )?),
+            None => None,
+        };
+        let certificate = match moments {
+            Some(moments) => Some(certified(
+                mesh,
+                discrete,
+                moments,
+                solution,
+                problem,
+                Grade::Rt0,
+            )?),
+            None => None,
+        };
+        let weighted = settings.estimate.estimator != Estimator::Paper;
+        let seen = settings.estimate.estimator == Estimator::Certified;
+        let unseen: Vec<f64> = (0..mesh.triangle_count())
+            .map(|t| {
+                if seen {
+                    return 0.0;
+                }
+                let h = mesh.shape(TriangleId(t as u32)).diameter();
+                let part = |i: usize| {
+                    discrete.loads[i].deviation_squared[t]
+                        / tension_weight(discrete, i, t, weighted)
+                };
+                h * h * (part(0) + part(1))
+            })
+            .collect();
+        // The driving estimator was asked for, so it is there.
+        let driving: &[f64] = match settings.estimate.estimator {
+            Estimator::Paper => paper.as_ref().map_or(&[], |p| &p.eta_k),
+            Estimator::Residual => residual.as_deref().unwrap_or_default(),
+            Estimator::Certified => certificate.as_ref().map_or(&[], |c| &c.local),
+        };
+        let marking: Vec<f64> = driving
+            .iter()
+            .zip(&unseen)
+            .map(|(e, o)| e * e + o)
+            .collect();
+        let unseen = unseen.iter().sum::<f64>().sqrt();
+        let bound = match settings.estimate.estimator {
+            Estimator::Paper => marking.iter().sum::<f64>().sqrt(),
+            Estimator::Residual => root_sum(driving),
+            Estimator::Certified => certificate.as_ref().map_or(0.0, |c| c.bound),
+        };
+        let mut largest = 0.0f64;
+        for t in mesh.triangle_ids() {
+            let shape = mesh.shape(t);
+            let weight = shape.diameter().powi(2) * shape.area;
+            let square = [0, 1].map(|i| {
+                let mean = discrete.loads[i].mean[t.index()];
+                weight * mean * mean / tension_weight(discrete, i, t.index(), weighted)
+            });
+            largest = largest.max(square[0] + square[1]);
+        }
+        let mut estimates = Estimates {
+            paper,
+            residual,
+            certificate,
+            oscillation,
+            errors,
+            marking,
+            unseen,
+            largest_contribution: largest.sqrt(),
+            energy: estimate::energy(mesh, discrete, solution),
+            bound,
+            reachable: bound,
+            error_size: None,
+        };
+        estimates.judge(settings.estimate.estimator == Estimator::Certified);
+        Ok(estimates)
+    }
+
+    /// Certifies again by another grade; returns the quotient of the new bound and the old one, 1 where both vanish.
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "the same list as everywhere, and two switches"
+    )]
+    pub(crate) fn certify(
+        &mut self,
+        mesh: &Mesh,
+        discrete: &DiscreteProblem,
+        moments: &Moments,
+        solution: &Solution,
+        problem: &Problem,
+        grade: Grade,
+        drives: bool,
+    ) -> Result<f64, FieldError> {
+        let new = certified(mesh, discrete, moments, solution, problem, grade)?;
+        let before = self.certificate.as_ref().map_or(0.0, |c| c.bound);
+        let ratio = if before > 0.0 {
+            new.bound / before
+        } else {
+            1.0
+        };
+        if drives {
+            self.bound = new.bound;
+        }
+        self.certificate = Some(new);
+        self.judge(drives);
+        Ok(ratio)
+    }
+
+    /// What follows from the certificate, or from the residual estimator where there is none.
+    fn judge(&mut self, drives: bool) {
+        self.reachable = self.bound;
+        if let Some(certificate) = &self.certificate {
+            self.error_size = Some(certificate.eta);
+            if drives {
+                self.reachable = certificate.without_algebraic();
+            }
+        } else if let Some(residual) = &self.residual {
+            self.error_size = Some(RESIDUAL_SHARE * root_sum(residual));
+        }
+    }
+}
+
+/// The error over the residual estimator, from the measured quotients of 4 to 6.
+const RESIDUAL_SHARE: f64 = 0.2;
+
+/// The tension that the squares of an estimator of the energy norm are divided by; 1 for the paper's.
+fn tension_weight(
+    discrete: &DiscreteProblem,
+    membrane: usize,
+    triangle: usize,
+    weighted: bool,
+) -> f64 {
+    if weighted {
+        discrete.tension_mean[membrane][triangle]
+    } else {
+        1.0
+    }
+}
+
+/// Exponent of the unit of an estimator.
+pub(crate) fn bound_unit(estimator: Estimator, scale: Scale) -> i32 {
+    match estimator {
+        Estimator::Certified | Estimator::Residual => scale.energy_norm(),
+        Estimator::Paper => scale.force(),
+    }
+}
+
+/// The certificate of a solution of a problem.
+///
+/// # Errors
+/// A value of a load or a tension that is not finite.
+fn certified(
+    mesh: &Mesh,
+    discrete: &DiscreteProblem,
+    moments: &Moments,
+    solution: &Solution,
+    problem: &Problem,
+    grade: Grade,
+) -> Result<Certificate, FieldError> {
+    let given = Given {
+        mesh,
+        load: [&*problem.load[0], &*problem.load[1]],
+        tension: [&*problem.tension[0], &*problem.tension[1]],
+        moments,
+        tension_mean: &discrete.tension_mean,
+        displacement: &solution.displacement,
+        force: &solution.force,
+    };
+    certify(&given, grade, POINCARE)
+}
