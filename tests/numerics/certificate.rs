@@ -149,7 +149,7 @@ fn certificate_on_all_cases() {
                     if n >= 1000 && name != "P4c" {
                         // The jump of the loads of P1 along a circle is not resolved at once where the grid begins with eight triangles.
                         let allowed = match (name, strategy) {
-                            ("P1", Strategy::Doerfler) => [1.56, 1.14],
+                            ("P1", Strategy::Doerfler) => [1.46, 1.11],
                             ("P1", _) => [1.45, 1.10],
                             _ => [1.40, 1.10],
                         };
@@ -365,7 +365,7 @@ fn certificate_on_needles() {
             let sharp = certificate(&problem, &level, Grade::Rt1, POINCARE).bound;
             table.note(&format!("{what} rt0"), fast, error);
             let b = table.note(&format!("{what} rt1"), sharp, error);
-            assert!(b <= 1.5, "{what}: {b}");
+            assert!(b <= 1.2, "{what}: {b}");
         }
     }
 }
@@ -440,5 +440,53 @@ fn certificate_marks_like_the_true_error() {
         let (certified, best) = (at(&run(false)), at(&run(true)));
         println!("{name}: {certified:.5e} by the certificate, {best:.5e} by the true error");
         assert!(certified <= 1.02 * best, "{name}: {}", certified / best);
+    }
+}
+
+/// Stopping the solver early changes nothing that matters: the same meshes, solved by multigrid to a tenth of the error and to rounding.
+#[test]
+fn certificate_steers_the_solver() {
+    for (name, grid) in [
+        ("P1", Grid::disk(8)),
+        ("P2", Grid::right(4)),
+        ("P3", Grid::lshape(4)),
+        ("P4a", Grid::cross(4)),
+        ("P8", Grid::right(4)),
+    ] {
+        let problem = on(name, &grid, 0);
+        let run = |tolerance| {
+            let mut settings = uniform(6);
+            settings.estimate.estimator = Estimator::Certified;
+            settings.estimate.also.clear();
+            settings.solve.solver = Solver::Multigrid;
+            settings.solve.tolerance = tolerance;
+            levels(&problem, &settings)
+        };
+        let full = run(Tolerance::Relative(1e-12));
+        let balanced = run(Tolerance::Balanced);
+        let sum = |levels: &[Level]| -> usize {
+            // The first mesh has no hierarchy; the last is iterated on, since its bound is reported.
+            levels[1..levels.len() - 1]
+                .iter()
+                .map(|l| l.solution.info.iterations)
+                .sum()
+        };
+        let (few, many) = (sum(&balanced), sum(&full));
+        println!("{name}: {few} cycles balanced, {many} to rounding");
+        for (b, f) in balanced.iter().zip(&full) {
+            let [b_error, f_error] =
+                [b, f].map(|l| l.estimates.errors.as_ref().expect("exact").energy);
+            let n = b.mesh.vertex_count();
+            println!("{name} {n}: error {:.4} of the full one", b_error / f_error);
+            assert!(b_error <= 1.005 * f_error, "{name} {n}");
+        }
+        let last = balanced.last().expect("levels");
+        let found = last.estimates.certificate.as_ref().expect("wanted");
+        println!(
+            "{name}: eta_alg/eta {:.1e} on the last level",
+            found.algebraic / found.eta
+        );
+        assert!(found.algebraic <= 0.1 * found.eta, "{name}");
+        assert!(3 * few <= many, "{name}: {few} of {many}");
     }
 }
