@@ -2,7 +2,9 @@
 
 mod agreement;
 mod cases;
+mod contact_set;
 mod covariance;
 mod efficiency;
+mod global_bound;
 mod rates;
 mod reference;

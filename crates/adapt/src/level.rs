@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use contact::{DiscreteProblem, Solution, Start};
-use estimate::{Energy, Paper, TrueErrors, root_sum};
+use estimate::{ContactSet, Energy, GlobalBound, Paper, TrueErrors, root_sum};
 use fem_core::scale::times_power_of_two;
 use fem_core::{Mesh, Scale, TriangleId};
 
@@ -36,12 +36,16 @@ pub struct Level {
 pub struct Estimates {
     /// Indicators of the paper, if wanted.
     pub paper: Option<Paper>,
+    /// The terms of the paper's global bound, if its indicators are wanted.
+    pub global_bound: Option<GlobalBound>,
     /// Residual estimator, if wanted.
     pub residual: Option<Vec<f64>>,
     /// Data oscillation.
     pub oscillation: Vec<f64>,
     /// Errors against the exact solution, if known.
     pub errors: Option<TrueErrors>,
+    /// The contact set against the exact one, if that is known.
+    pub contact_set: Option<ContactSet>,
     /// Squares that triangles are marked by: the driving estimator and the oscillation.
     pub marking: Vec<f64>,
     /// The largest contribution h_K |K|^(1/2) |f_ih| of the loads to the driving estimator, before anything cancels.
@@ -160,6 +164,9 @@ impl Estimates {
         let residual =
             wants(Estimator::Residual).then(|| estimate::residual(mesh, discrete, solution));
         let oscillation = estimate::oscillation(mesh, discrete);
+        let global_bound = paper
+            .as_ref()
+            .map(|paper| estimate::global_bound(mesh, discrete, solution, paper, &oscillation));
         let errors = match &problem.exact {
             Some(exact) => Some(estimate::true_errors(
                 mesh,
@@ -168,6 +175,10 @@ impl Estimates {
                 exact,
                 &problem.tension,
             )?),
+            None => None,
+        };
+        let contact_set = match problem.exact.as_ref().and_then(|e| e.contact.as_deref()) {
+            Some(exact) => Some(estimate::contact_set(mesh, discrete, solution, exact)?),
             None => None,
         };
         let weighted = settings.estimate.estimator == Estimator::Residual;
@@ -208,9 +219,11 @@ impl Estimates {
         }
         Ok(Estimates {
             paper,
+            global_bound,
             residual,
             oscillation,
             errors,
+            contact_set,
             marking,
             unseen,
             largest_contribution: largest.sqrt(),
@@ -283,6 +296,8 @@ fn record(
             .paper
             .as_ref()
             .map(|p| by(p.eta_e_sum(), scale.force())),
+        bound_711: estimates.global_bound.map(|b| b.literal(scale)),
+        bound_711_repaired: estimates.global_bound.map(|b| b.repaired(scale)),
         residual: estimates
             .residual
             .as_ref()
@@ -301,6 +316,14 @@ fn record(
         kkt_residual: solution.info.kkt_residual,
         contact_force: by(solution.force.iter().fold(0.0, |a, b| a + b), scale.force()),
         max_action: by(pressures.fold(0.0, f64::max), scale.load),
+        contact_area_error: estimates
+            .contact_set
+            .map(|c| by(c.area_error(), scale.area())),
+        contact_jaccard: estimates.contact_set.map(|c| c.jaccard()),
+        contact_hausdorff: estimates
+            .contact_set
+            .and_then(|c| c.hausdorff)
+            .map(|d| by(d, scale.length)),
         smallest_gap: by(
             (0..mesh.vertex_count())
                 .map(|j| solution.gap(j))

@@ -26,6 +26,10 @@ pub struct LevelRecord {
     pub eta_k: Option<f64>,
     /// Plain sum of (7.2).
     pub eta_e_sum: Option<f64>,
+    /// The global bound (7.11) without its constant.
+    pub bound_711: Option<f64>,
+    /// The same with a second term that converges.
+    pub bound_711_repaired: Option<f64>,
     /// Residual estimator.
     pub residual: Option<f64>,
     /// Data oscillation.
@@ -56,6 +60,12 @@ pub struct LevelRecord {
     pub contact_force: f64,
     /// Largest pressure z_j / |D_j|.
     pub max_action: f64,
+    /// Difference of contact_area and the area of the exact contact set.
+    pub contact_area_error: Option<f64>,
+    /// Area of both contact sets over that of either.
+    pub contact_jaccard: Option<f64>,
+    /// Hausdorff distance of the two contact sets; none when one of them is empty.
+    pub contact_hausdorff: Option<f64>,
     /// Smallest gap u1 - u2 over all vertices.
     pub smallest_gap: f64,
     /// Wall seconds of refinement and transfer to this level.

@@ -1,0 +1,106 @@
+//! The largest distance from the points of some triangles to a set of segments.
+//!
+//! The distance to one segment is a convex function, so on a triangle the distance to the nearest of all segments is at most the largest of the corners' distances
+//! to any single one of them. Triangles whose bound by the segment nearest to their centre exceeds the largest distance met so far are quartered.
+
+use super::nearest::{Nearest, squared_distance};
+
+/// A triangle whose points are asked for their distance, with a length below which distances do not matter.
+#[derive(Clone, Copy)]
+pub(super) struct Source {
+    /// Corners.
+    pub corners: [[f64; 2]; 3],
+    /// Diameter of the element that the triangle is a part of.
+    pub size: f64,
+}
+
+/// The result is the largest distance to this relative accuracy, or to this share of the element's diameter.
+const ACCURACY: f64 = 1.0 / 1024.0;
+
+/// A triangle is quartered at most so often.
+const DEPTH: u32 = 16;
+
+/// The largest distance; none if there are no segments, 0 if there are no triangles.
+pub(super) fn largest_distance(sources: &[Source], target: &Nearest) -> Option<f64> {
+    let mut largest = 0.0f64;
+    let mut stack = Vec::new();
+    // First a look at every triangle, so that the search below starts with a distance that leaves little to divide.
+    for source in sources {
+        let (lower, upper) = source.bounds(target)?;
+        largest = largest.max(lower);
+        stack.push((*source, upper, 0));
+    }
+    while let Some((source, upper, depth)) = stack.pop() {
+        let settled = upper <= largest * (1.0 + ACCURACY) || upper <= ACCURACY * source.size;
+        if settled || depth == DEPTH {
+            continue;
+        }
+        for corner in source.corners {
+            largest = largest.max(target.find(corner)?.1.sqrt());
+        }
+        if upper <= largest * (1.0 + ACCURACY) {
+            continue;
+        }
+        for part in source.quarters() {
+            let (lower, upper) = part.bounds(target)?;
+            largest = largest.max(lower);
+            stack.push((part, upper, depth + 1));
+        }
+    }
+    Some(largest)
+}
+
+impl Source {
+    /// The distance of the centre, and what no point of the triangle exceeds.
+    fn bounds(&self, target: &Nearest) -> Option<(f64, f64)> {
+        let [a, b, c] = self.corners;
+        let centre = [(a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0];
+        let (segment, lower) = target.find(centre)?;
+        let upper = self
+            .corners
+            .iter()
+            .map(|&p| squared_distance(p, segment))
+            .fold(lower, f64::max);
+        Some((lower.sqrt(), upper.sqrt()))
+    }
+
+    fn quarters(&self) -> [Source; 4] {
+        let [a, b, c] = self.corners;
+        let middle = |p: [f64; 2], q: [f64; 2]| [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
+        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+        [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].map(|corners| Source {
+            corners,
+            size: self.size,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn source(corners: [[f64; 2]; 3]) -> Source {
+        Source { corners, size: 1.0 }
+    }
+
+    #[test]
+    fn a_maximum_between_two_segments_is_found() {
+        // The farthest point of the triangle lies in its inside, halfway between the segments x = 0 and x = 2.
+        let target = Nearest::new(vec![[[0.0, -9.0], [0.0, 9.0]], [[2.0, -9.0], [2.0, 9.0]]]);
+        let found = largest_distance(&[source([[0.1, 0.0], [1.9, 0.1], [1.7, 1.0]])], &target);
+        let found = found.unwrap();
+        assert!((found - 1.0).abs() <= ACCURACY, "{found}");
+    }
+
+    #[test]
+    fn corners_and_empty_sets() {
+        let target = Nearest::new(vec![[[0.0, 0.0], [1.0, 0.0]]]);
+        let sources = [
+            source([[0.0, 0.0], [1.0, 0.0], [0.5, 0.25]]),
+            source([[1.0, 0.0], [4.0, 4.0], [1.0, 1.0]]),
+        ];
+        assert_eq!(largest_distance(&sources, &target), Some(5.0));
+        assert_eq!(largest_distance(&[], &target), Some(0.0));
+        assert_eq!(largest_distance(&sources, &Nearest::new(Vec::new())), None);
+    }
+}
