@@ -8,3 +8,4 @@ mod efficiency;
 mod global_bound;
 mod rates;
 mod reference;
+mod second;

@@ -10,6 +10,7 @@
 //! - [`mod@energy`]: J(u_h) and the energy norm of u_h;
 //! - [`exact`], [`errors`]: a known solution, and the true errors against it;
 //! - [`mod@contact_set`]: the contact set against the exact one;
+//! - [`mod@finite_volume`]: the second discretisation, the action as an unknown on the dual cells, and its errors;
 //! - [`mod@efficiency`]: the constants of (7.13) and (7.14) that a solution attains.
 //!
 //! All numbers are in scaled units, see [`fem_core::scale`]. Local arrays have one entry a triangle (or interior edge) in the order of the mesh
@@ -21,6 +22,7 @@ pub mod efficiency;
 pub mod energy;
 pub mod errors;
 pub mod exact;
+pub mod finite_volume;
 pub mod global_bound;
 mod gradients;
 pub mod oscillation;
@@ -33,6 +35,7 @@ pub use efficiency::{Efficiency, efficiency};
 pub use energy::{Energy, energy};
 pub use errors::{TrueErrors, true_errors};
 pub use exact::{Exact, Gradient};
+pub use finite_volume::{Defect, FiniteVolume, finite_volume};
 pub use global_bound::{GlobalBound, global_bound};
 pub use oscillation::oscillation;
 pub use paper::{Paper, paper};
