@@ -16,7 +16,7 @@ fn bounds_in_the_units_of_the_user() {
             -3.0 * load,
             0.05 * load * side * side / tension,
             2.0 * tension,
-            -1.0 * load
+            -load
         ));
         assert_ne!(scene.problem.scale, Scale::default());
         let level = crate::cases::levels(&scene.problem, &uniform(1)).remove(0);

@@ -9,7 +9,7 @@
 //! Hausdorff    max( sup_{x in C \ C_h} dist(x, C_h),  sup_{x in C_h \ C} dist(x, C) ),   0 if both are empty, none if one is
 //! ```
 //!
-//! Both sets are taken as unions of convex parts of elements (`cut`): D_j exactly, C with straight lines in pieces of diameter d <= h/8 that its border crosses. A border of
+//! Both sets are taken as unions of convex parts of elements (`cut`): D_j exactly, C with straight lines in pieces of diameter d <= h/3 that its border crosses. A border of
 //! length L and curvature k costs at most L k d^2/12 in the areas and k d^2/8 in the distance; the distance itself is found to 1/1024 of itself or of the element's diameter. A part of C thinner than half an
 //! element (and than 1/2000 of the domain in area) may fall between the samples, and a set without area, such as a segment or a point, counts as empty.
 //!
@@ -23,7 +23,7 @@ mod nearest;
 use contact::{DiscreteProblem, Solution};
 use fem_core::{Field, FieldError, Mesh, TriangleId};
 
-use cut::{CENTRE, Part, cell, divide, point, share};
+use cut::{CENTRE, Part, cell, divide, point};
 use distance::{Source, largest_distance};
 use nearest::{Nearest, Segment};
 
@@ -114,16 +114,21 @@ impl Sets<'_> {
         let local = self.mesh.triangles()[t.index()].map(|j| self.contact[j.index()]);
         match part.cell {
             Some(k) => {
-                let area = area * share(&part.corners);
+                let area = area * part.corners.share();
                 self.areas(area, local[k], part.inside);
                 let corners = self.mesh.corners(t);
-                let points: Vec<_> = part.corners.iter().map(|&p| point(&corners, p)).collect();
+                let places = part.corners.places();
+                let mut points = [[0.0; 2]; 4];
+                for (p, place) in points.iter_mut().zip(places) {
+                    *p = point(&corners, *place);
+                }
+                let points = &points[..places.len()];
                 if part.inside {
                     let ends =
                         (0..points.len()).map(|i| [points[i], points[(i + 1) % points.len()]]);
                     self.border.extend(ends);
                 }
-                self.differ(t, &points, local[k], part.inside);
+                self.differ(t, points, local[k], part.inside);
             }
             None => {
                 self.whole[t.index()] = part.inside;

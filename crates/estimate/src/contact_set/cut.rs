@@ -3,7 +3,7 @@
 //! An element is looked at in its three corners, its edge midpoints and its barycentre. Where they disagree it is divided into the six sub-triangles with these
 //! points as corners (so that no part crosses the border of a dual cell), and these are quartered while their own seven points disagree. The smallest pieces are
 //! cut by a straight line between the points where the border of the set crosses their edges, found by bisection. With
-//! the diameter d of the smallest pieces, at most h/8, the line is off a border of curvature k by at most k d^2/8.
+//! the diameter d of the smallest pieces, at most h/3, the line is off a border of curvature k by at most k d^2/8.
 //!
 //! Points are moved by 2^-20 of their way towards the barycentre of their element before the field is evaluated: strictly inside, on the element's own side of a border that runs along
 //! an edge.
@@ -13,6 +13,42 @@ use fem_core::{Field, FieldError, Mesh, Samples, Shape, TriangleId};
 /// Barycentric coordinates in an element.
 pub(super) type Place = [f64; 3];
 
+/// A convex polygon with three or four corners.
+#[derive(Clone, Copy)]
+pub(super) struct Polygon {
+    places: [Place; 4],
+    count: usize,
+}
+
+impl Polygon {
+    fn triangle([a, b, c]: [Place; 3]) -> Polygon {
+        Polygon {
+            places: [a, b, c, c],
+            count: 3,
+        }
+    }
+
+    fn quadrangle(places: [Place; 4]) -> Polygon {
+        Polygon { places, count: 4 }
+    }
+
+    /// The corners.
+    pub fn places(&self) -> &[Place] {
+        &self.places[..self.count]
+    }
+
+    /// The share of the polygon in the area of its element.
+    pub fn share(&self) -> f64 {
+        let [a, b, c, d] = self.places;
+        let share = |p: Place, q: Place| {
+            let (p, q) = ([p[1] - a[1], p[2] - a[2]], [q[1] - a[1], q[2] - a[2]]);
+            p[0] * q[1] - p[1] * q[0]
+        };
+        // The fourth corner of a triangle repeats the third.
+        share(b, c) + share(c, d)
+    }
+}
+
 /// A convex part of an element that lies on one side of the border.
 pub(super) struct Part {
     /// The element.
@@ -20,7 +56,7 @@ pub(super) struct Part {
     /// The local vertex in whose dual cell the part lies; none for a whole element.
     pub cell: Option<usize>,
     /// Three or four corners, counter-clockwise.
-    pub corners: Vec<Place>,
+    pub corners: Polygon,
     /// Whether the part belongs to the set.
     pub inside: bool,
 }
@@ -35,7 +71,7 @@ pub(super) const CENTRE: Place = [1.0 / 3.0; 3];
 const LARGEST_SHARE: f64 = 1.0 / 2000.0;
 
 /// A cut sub-triangle is quartered at least and at most so often; between these until it is no longer than the given share of the domain's extent.
-const DEPTH: std::ops::Range<u32> = 2..7;
+const DEPTH: std::ops::Range<u32> = 1..7;
 const FINE: f64 = 1.0 / 256.0;
 
 /// Steps of bisection along an edge of a smallest piece.
@@ -111,7 +147,7 @@ impl Cutter<'_> {
                 visit(Part {
                     triangle: t,
                     cell: None,
-                    corners: WHOLE.to_vec(),
+                    corners: Polygon::triangle(WHOLE),
                     inside: flags[0],
                 });
             } else {
@@ -137,7 +173,7 @@ impl Cutter<'_> {
                 let smallest = piece.depth >= DEPTH.start && shape.diameter() <= self.fine
                     || piece.depth >= DEPTH.end;
                 if agree && (small || smallest) {
-                    visit(piece.part(piece.corners.to_vec(), flags[0]));
+                    visit(piece.part(Polygon::triangle(piece.corners), flags[0]));
                 } else if smallest {
                     cut.push((piece, [flags[0], flags[1], flags[2]]));
                 } else {
@@ -196,19 +232,19 @@ impl Cutter<'_> {
                     .map(|c| (k, [c[0] + 0.5 * step, c[1] + 0.5 * step]))
             });
             let Some((k, [s, t])) = found else {
-                visit(piece.part(piece.corners.to_vec(), flags[0]));
+                visit(piece.part(Polygon::triangle(piece.corners), flags[0]));
                 continue;
             };
             let share = s * t;
             if !(NEGLIGIBLE..=1.0 - NEGLIGIBLE).contains(&share) {
                 let inside = flags[k] == (share > 0.5);
-                visit(piece.part(piece.corners.to_vec(), inside));
+                visit(piece.part(Polygon::triangle(piece.corners), inside));
                 continue;
             }
             let [a, b, c] = [0, 1, 2].map(|i| piece.corners[(k + i) % 3]);
             let (p, q) = (between(a, b, s), between(a, c, t));
-            visit(piece.part(vec![a, p, q], flags[k]));
-            visit(piece.part(vec![p, b, c, q], !flags[k]));
+            visit(piece.part(Polygon::triangle([a, p, q]), flags[k]));
+            visit(piece.part(Polygon::quadrangle([p, b, c, q]), !flags[k]));
         }
         Ok(())
     }
@@ -243,7 +279,7 @@ impl Cutter<'_> {
 }
 
 impl Piece {
-    fn part(&self, corners: Vec<Place>, inside: bool) -> Part {
+    fn part(&self, corners: Polygon, inside: bool) -> Part {
         Part {
             triangle: self.triangle,
             cell: Some(self.cell),
@@ -310,15 +346,4 @@ fn between(a: Place, b: Place, t: f64) -> Place {
 pub(super) fn point(corners: &[[f64; 2]; 3], place: Place) -> [f64; 2] {
     let [a, b, c] = corners;
     [0, 1].map(|k| a[k] + place[1] * (b[k] - a[k]) + place[2] * (c[k] - a[k]))
-}
-
-/// The share of a convex polygon in the area of its element.
-pub(super) fn share(corners: &[Place]) -> f64 {
-    let [first, rest @ ..] = corners else {
-        return 0.0;
-    };
-    let d = |p: &Place, k: usize| p[k] - first[k];
-    rest.windows(2)
-        .map(|w| (d(&w[0], 1) * d(&w[1], 2) - d(&w[0], 2) * d(&w[1], 1)).abs())
-        .sum()
 }

@@ -3,7 +3,7 @@
 //! The distance to one segment is a convex function, so on a triangle the distance to the nearest of all segments is at most the largest of the corners' distances
 //! to any single one of them. Triangles whose bound by the segment nearest to their centre exceeds the largest distance met so far are quartered.
 
-use super::nearest::{Nearest, squared_distance};
+use super::nearest::{Nearest, Segment, squared_distance};
 
 /// A triangle whose points are asked for their distance, with a length below which distances do not matter.
 #[derive(Clone, Copy)]
@@ -24,9 +24,15 @@ const DEPTH: u32 = 16;
 pub(super) fn largest_distance(sources: &[Source], target: &Nearest) -> Option<f64> {
     let mut largest = 0.0f64;
     let mut stack = Vec::new();
-    // First a look at every triangle, so that the search below starts with a distance that leaves little to divide.
+    // First a look at every triangle, so that the search below starts with a distance that leaves little to divide. Triangles follow each other in space: most
+    // are settled by the segment that was nearest to the last one that was not.
+    let mut hint: Option<Segment> = None;
     for source in sources {
-        let (lower, upper) = source.bounds(target)?;
+        if hint.is_some_and(|segment| source.farthest(&segment) <= largest * (1.0 + ACCURACY)) {
+            continue;
+        }
+        let (segment, lower, upper) = source.bounds(target)?;
+        hint = Some(*segment);
         largest = largest.max(lower);
         stack.push((*source, upper, 0));
     }
@@ -42,7 +48,7 @@ pub(super) fn largest_distance(sources: &[Source], target: &Nearest) -> Option<f
             continue;
         }
         for part in source.quarters() {
-            let (lower, upper) = part.bounds(target)?;
+            let (_, lower, upper) = part.bounds(target)?;
             largest = largest.max(lower);
             stack.push((part, upper, depth + 1));
         }
@@ -51,17 +57,19 @@ pub(super) fn largest_distance(sources: &[Source], target: &Nearest) -> Option<f
 }
 
 impl Source {
-    /// The distance of the centre, and what no point of the triangle exceeds.
-    fn bounds(&self, target: &Nearest) -> Option<(f64, f64)> {
+    /// The segment nearest to the centre, its distance from there, and what no point of the triangle exceeds.
+    fn bounds<'t>(&self, target: &'t Nearest) -> Option<(&'t Segment, f64, f64)> {
         let [a, b, c] = self.corners;
         let centre = [(a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0];
         let (segment, lower) = target.find(centre)?;
-        let upper = self
-            .corners
-            .iter()
-            .map(|&p| squared_distance(p, segment))
-            .fold(lower, f64::max);
-        Some((lower.sqrt(), upper.sqrt()))
+        Some((segment, lower.sqrt(), self.farthest(segment)))
+    }
+
+    /// The largest distance of a corner from a segment: no point of the triangle is farther from it.
+    fn farthest(&self, segment: &Segment) -> f64 {
+        let corners = self.corners.iter();
+        let squares = corners.map(|&p| squared_distance(p, segment));
+        squares.fold(0.0, f64::max).sqrt()
     }
 
     fn quarters(&self) -> [Source; 4] {

@@ -98,7 +98,7 @@ fn a_disk_inside_a_cell_and_around_it() {
 
 #[test]
 fn areas_and_distances_are_exact_to_a_small_part_of_the_element() {
-    // A circle of radius 0.7 that no vertex knows of; h is the diameter of the elements. The bounds are those of the module's head with
+    // A circle of radius 0.7 that no vertex knows of; h is the diameter of the elements. The bounds are those of the module head, held even with
     // d = h/8: 2 pi k d^2/12 and k d^2/8, and for the distance its own accuracy.
     for n in [8, 32, 128] {
         let (r, h) = (0.7, 8f64.sqrt() / n as f64);
