@@ -153,6 +153,32 @@ mod tests {
     }
 
     #[test]
+    fn the_mean_of_the_gap_is_weighted_by_area() {
+        // The inner vertex at (1/2, 0): triangles of area 1, 1/2, 1, 3/2, the gap 1/2 at a corner of the first two.
+        let mut points = four_triangles().points().to_vec();
+        points[4] = [0.5, 0.0];
+        let mesh = Mesh::new(
+            points,
+            &[[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
+            &[],
+            None,
+        )
+        .unwrap();
+        let problem = problem(&mesh, [vec![1.0; 4], vec![1.0; 4]], [0.0, 0.0]);
+        let solution = solution(
+            [vec![0.0, 0.5, 0.0, 0.0, 0.0], vec![0.0; 5]],
+            vec![0.0, 0.0, 0.0, 0.0, 16.0],
+            vec![0.0; 5],
+        );
+        let area: Vec<f64> = mesh.triangle_ids().map(|t| mesh.shape(t).area).collect();
+        close(
+            force_times_gap(&mesh, &problem, &solution, &area),
+            1.0,
+            1e-14,
+        );
+    }
+
+    #[test]
     fn terms_are_joined_in_the_units_of_the_user() {
         let bound = GlobalBound {
             edges: 0.7,

@@ -101,6 +101,15 @@ mod tests {
     }
 
     #[test]
+    fn the_middle_of_a_triangle_is_searched_too() {
+        // The farthest point from three points is the centre (2, 1) of the circle through them.
+        let corners = [[0.0, 0.0], [4.0, 0.0], [1.0, 3.0]];
+        let target = Nearest::new(corners.map(|p| [p, p]).to_vec());
+        let found = largest_distance(&[source(corners)], &target).unwrap();
+        assert!((found / 5f64.sqrt() - 1.0).abs() <= ACCURACY, "{found}");
+    }
+
+    #[test]
     fn corners_and_empty_sets() {
         let target = Nearest::new(vec![[[0.0, 0.0], [1.0, 0.0]]]);
         let sources = [

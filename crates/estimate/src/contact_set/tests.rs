@@ -122,6 +122,21 @@ fn areas_and_distances_are_exact_to_a_small_part_of_the_element() {
 }
 
 #[test]
+fn fields_are_looked_at_inside_elements_only() {
+    // Infinite at a vertex, and a set that ends where an edge runs.
+    let mesh = grid(8, 1.0);
+    let (n, ones) = (mesh.vertex_count(), vec![1.0; mesh.triangle_count()]);
+    let problem = problem(&mesh, [ones.clone(), ones], [0.0, 0.0]);
+    let solution = solution([vec![0.0; n], vec![0.0; n]], vec![0.0; n], vec![0.0; n]);
+    let singular = |x: f64, y: f64| {
+        let r = x.hypot(y);
+        if x < 0.25 { r.ln().min(1.0 / r) } else { 0.0 }
+    };
+    let found = contact_set(&mesh, &problem, &solution, &singular).unwrap();
+    close(found.exact_area, 2.5, 1e-13);
+}
+
+#[test]
 fn empty_sets() {
     let mesh = grid(8, 1.0);
     let both = compare(&mesh, none, |_, _| false);
