@@ -128,7 +128,7 @@ impl FiniteVolume {
         for (sum, own) in load.iter_mut().zip(cells::loads(mesh, &fine, &self.action)) {
             *sum -= own;
         }
-        Ok(poisson::seminorm_of_solution(&fine.mesh, &load))
+        Ok(poisson::seminorm_of_solution(&fine, &load))
     }
 }
 

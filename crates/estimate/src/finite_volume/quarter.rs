@@ -13,6 +13,8 @@ pub(super) struct Quartered {
     pub mesh: Mesh,
     /// Vertices of its triangles, in the order of `places`.
     pub triangles: Vec<[u32; 3]>,
+    /// The ends of the edge that each vertex beyond the coarse ones halves; ends come before their vertex.
+    pub parents: Vec<[u32; 2]>,
     /// Corners of the fine triangles of one coarse triangle.
     pub places: Vec<[Place; 3]>,
 }
@@ -22,12 +24,14 @@ impl Quartered {
         let mut points = mesh.points().to_vec();
         let mut triangles: Vec<[u32; 3]> =
             mesh.triangles().iter().map(|v| v.map(|j| j.0)).collect();
+        let mut parents = Vec::new();
         let mut places = vec![[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]];
         for _ in 0..times {
             let mut born = HashMap::with_capacity(2 * triangles.len());
             let mut middle = |a: u32, b: u32| {
                 *born.entry((a.min(b), a.max(b))).or_insert_with(|| {
                     let [p, q] = [a, b].map(|j| points[j as usize]);
+                    parents.push([a, b]);
                     points.push([0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]);
                     points.len() as u32 - 1
                 })
@@ -59,6 +63,7 @@ impl Quartered {
         Quartered {
             mesh,
             triangles,
+            parents,
             places,
         }
     }
