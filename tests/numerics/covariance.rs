@@ -63,6 +63,7 @@ fn rescaled(name: &str, domain: &str, a: i32, k: i32, l: i32) -> scene::Scene {
             (_, "load") | ("[exact]", "action") => Some("F"),
             (_, "boundary") | ("[exact]", "upper") | ("[exact]", "lower") => Some("U"),
             ("[exact]", "sigma") => Some("G"),
+            ("[exact]", "contact") => Some("1"),
             _ => None,
         };
         match line
@@ -117,6 +118,8 @@ fn same_level(what: &str, a: &Level, b: &Level) {
     );
     same_bits(&format!("{what} eta_K"), &p.eta_k, &q.eta_k);
     same_bits(&format!("{what} eta_e"), &p.eta_e, &q.eta_e);
+    assert_eq!(a.estimates.global_bound, b.estimates.global_bound, "{what}");
+    assert_eq!(a.estimates.contact_set, b.estimates.contact_set, "{what}");
     let (p, q) = (
         a.estimates.residual.as_ref().expect("residual"),
         b.estimates.residual.as_ref().expect("residual"),
@@ -156,6 +159,9 @@ fn same_record(what: &str, plain: &LevelRecord, other: &LevelRecord, by: Scale) 
             (r.effectivity, 0),
             (r.sigma_error, by.force()),
             (r.h1_error, by.displacement()),
+            (r.contact_area_error, by.area()),
+            (r.contact_jaccard, 0),
+            (r.contact_hausdorff, by.length),
             (Some(r.contact_force), by.force()),
             (Some(r.max_action), by.load),
             (Some(r.smallest_gap), by.displacement()),

@@ -3,7 +3,10 @@
 mod agreement;
 mod cases;
 mod certificate;
+mod contact_set;
 mod covariance;
 mod efficiency;
+mod global_bound;
 mod rates;
 mod reference;
+mod second;

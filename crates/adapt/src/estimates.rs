@@ -2,7 +2,10 @@
 
 use contact::{DiscreteProblem, Solution};
 use estimate::certificate::POINCARE;
-use estimate::{Certificate, Energy, Given, Grade, Moments, Paper, TrueErrors, certify, root_sum};
+use estimate::{
+    Certificate, ContactSet, Energy, Given, GlobalBound, Grade, Moments, Paper, TrueErrors,
+    certify, root_sum,
+};
 use fem_core::{FieldError, Mesh, Scale, TriangleId};
 
 use crate::problem::Problem;
@@ -14,6 +17,8 @@ use crate::settings::{Estimator, Settings};
 pub struct Estimates {
     /// Indicators of the paper, if wanted.
     pub paper: Option<Paper>,
+    /// The terms of the paper's global bound, if its indicators are wanted.
+    pub global_bound: Option<GlobalBound>,
     /// Residual estimator, if wanted.
     pub residual: Option<Vec<f64>>,
     /// The certificate, if wanted.
@@ -22,6 +27,8 @@ pub struct Estimates {
     pub oscillation: Vec<f64>,
     /// Errors against the exact solution, if known.
     pub errors: Option<TrueErrors>,
+    /// The contact set against the exact one, if that is known.
+    pub contact_set: Option<ContactSet>,
     /// Squares that triangles are marked by: the driving estimator and the oscillation.
     pub marking: Vec<f64>,
     /// The largest contribution h_K |K|^(1/2) |f_ih| of the loads to the driving estimator, before anything cancels.
@@ -53,6 +60,9 @@ impl Estimates {
         let residual =
             wants(Estimator::Residual).then(|| estimate::residual(mesh, discrete, solution));
         let oscillation = estimate::oscillation(mesh, discrete);
+        let global_bound = paper
+            .as_ref()
+            .map(|paper| estimate::global_bound(mesh, discrete, solution, paper, &oscillation));
         let errors = match &problem.exact {
             Some(exact) => Some(estimate::true_errors(
                 mesh,
@@ -61,6 +71,10 @@ impl Estimates {
                 exact,
                 &problem.tension,
             )?),
+            None => None,
+        };
+        let contact_set = match problem.exact.as_ref().and_then(|e| e.contact.as_deref()) {
+            Some(exact) => Some(estimate::contact_set(mesh, discrete, solution, exact)?),
             None => None,
         };
         let certificate = match moments {
@@ -118,10 +132,12 @@ impl Estimates {
         }
         let mut estimates = Estimates {
             paper,
+            global_bound,
             residual,
             certificate,
             oscillation,
             errors,
+            contact_set,
             marking,
             unseen,
             largest_contribution: largest.sqrt(),

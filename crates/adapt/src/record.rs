@@ -35,6 +35,10 @@ pub struct LevelRecord {
     pub eta_k: Option<f64>,
     /// Plain sum of (7.2).
     pub eta_e_sum: Option<f64>,
+    /// The global bound (7.11) without its constant.
+    pub bound_711: Option<f64>,
+    /// The same with a second term that converges.
+    pub bound_711_repaired: Option<f64>,
     /// Residual estimator.
     pub residual: Option<f64>,
     /// The certificate: (B1).
@@ -71,6 +75,12 @@ pub struct LevelRecord {
     pub contact_force: f64,
     /// Largest pressure z_j / |D_j|.
     pub max_action: f64,
+    /// Difference of contact_area and the area of the exact contact set.
+    pub contact_area_error: Option<f64>,
+    /// Area of both contact sets over that of either.
+    pub contact_jaccard: Option<f64>,
+    /// Hausdorff distance of the two contact sets; none when one of them is empty.
+    pub contact_hausdorff: Option<f64>,
     /// Smallest gap u1 - u2 over all vertices.
     pub smallest_gap: f64,
     /// Wall seconds of refinement and transfer to this level.
@@ -156,6 +166,8 @@ impl LevelRecord {
                 .paper
                 .as_ref()
                 .map(|p| by(p.eta_e_sum(), scale.force())),
+            bound_711: estimates.global_bound.map(|b| b.literal(scale)),
+            bound_711_repaired: estimates.global_bound.map(|b| b.repaired(scale)),
             residual: estimates
                 .residual
                 .as_ref()
@@ -174,6 +186,14 @@ impl LevelRecord {
             kkt_residual: solution.info.kkt_residual,
             contact_force: by(solution.force.iter().fold(0.0, |a, b| a + b), scale.force()),
             max_action: by(pressures.fold(0.0, f64::max), scale.load),
+            contact_area_error: estimates
+                .contact_set
+                .map(|c| by(c.area_error(), scale.area())),
+            contact_jaccard: estimates.contact_set.map(|c| c.jaccard()),
+            contact_hausdorff: estimates
+                .contact_set
+                .and_then(|c| c.hausdorff)
+                .map(|d| by(d, scale.length)),
             smallest_gap: by(
                 (0..mesh.vertex_count())
                     .map(|j| solution.gap(j))

@@ -53,11 +53,16 @@ fn a_row_holds_what_applies_and_nothing_else() {
     assert_eq!(
         lines[2],
         "1,200,360,160,12,0.30000000000000004,-0.3333333333333333,1e-9,0.25,0.5,1e22,,0,0.125,0.01,2,1.5,3,\
-         active-set,5,1.5e-16,0.5,0.25,0.125,1,2,8.5,residual,,,,4,6,7,,,"
+         active-set,5,1.5e-16,0.5,0.25,0.125,1,2,8.5,residual,,10,11,4,6,7,0.75,0.875,0.0625"
     );
     let bare = LevelRecord {
         eta_k: None,
         eta_e_sum: None,
+        bound_711: None,
+        bound_711_repaired: None,
+        contact_area_error: None,
+        contact_jaccard: None,
+        contact_hausdorff: None,
         residual: None,
         relative_bound: None,
         true_error: None,

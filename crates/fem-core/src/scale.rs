@@ -67,6 +67,14 @@ pub fn times_power_of_two(value: f64, exponent: i32) -> f64 {
     value * power_of_two(left)
 }
 
+/// `(value * 2^exponent)^(1/2)` for a value that is not negative, rounded as if the product had no limits.
+///
+/// For numbers whose unit is a root that powers of two do not divide evenly; an odd exponent leaves a factor of two under the root.
+pub fn root_times_power_of_two(value: f64, exponent: i32) -> f64 {
+    let odd = exponent.rem_euclid(2);
+    times_power_of_two(times_power_of_two(value, odd).sqrt(), (exponent - odd) / 2)
+}
+
 /// 2^exponent for -1022 <= exponent <= 1023.
 fn power_of_two(exponent: i32) -> f64 {
     f64::from_bits(((exponent + 1023) as u64) << 52)
@@ -106,6 +114,18 @@ mod tests {
         assert_eq!(times_power_of_two(1.0, 1024), f64::INFINITY);
         assert_eq!(times_power_of_two(1.0, -1074), f64::from_bits(1));
         assert_eq!(times_power_of_two(-3.0, 0), -3.0);
+    }
+
+    #[test]
+    fn roots_of_odd_and_even_powers() {
+        for value in [0.0, 0.3, 1.0, 7.5] {
+            for exponent in -9..9 {
+                let direct = times_power_of_two(value, exponent).sqrt();
+                assert_eq!(root_times_power_of_two(value, exponent), direct);
+            }
+        }
+        assert_eq!(root_times_power_of_two(2.0, 2001), power_of_two(1001));
+        assert_eq!(root_times_power_of_two(2.0, -1901), power_of_two(-950));
     }
 
     #[test]
