@@ -174,6 +174,7 @@ fn adaptive(problem: &Problem, estimator: Estimator) -> Vec<Level> {
         estimate: Estimate {
             estimator,
             also: vec![Estimator::Paper, Estimator::Residual],
+            last: Final::Fast,
         },
         stop: Stop {
             vertices: Some(4_000),
