@@ -1,6 +1,7 @@
 //! The two discretisations of the action side by side: errors, estimators, cost. `docs/second-discretisation.md` holds the tables that this prints.
 //!
-//! Method 1: (u_h, sigma_h), the action -laplace sigma_h, the estimators (7.1) and (7.2). Method 2: (u_h, lambda_h), lambda_h constant on dual cells, the residual estimator.
+//! Method 1: (u_h, sigma_h), the action -laplace sigma_h, the estimators (7.1) and (7.2). Method 2: (u_h, lambda_h), lambda_h constant on dual
+//! cells, the residual estimator.
 
 use std::fmt::Write as _;
 use std::hint::black_box;

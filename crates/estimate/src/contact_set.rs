@@ -1,7 +1,8 @@
 //! How well the contact set is found: the discrete one against the exact one.
 //!
-//! The discrete contact set C_h is the union of the barycentric dual cells D_j of the contact vertices; its area is the column `contact_area`. The exact set C is where the field [`crate::Exact`] calls
-//! `contact` is not zero. With |.| the area:
+//! The discrete contact set C_h is the union of the barycentric dual cells D_j of the contact vertices; its area is the
+//! column `contact_area`. The exact set C is where the field [`crate::Exact`] calls `contact` is not zero. With |.| the
+//! area:
 //!
 //! ```text
 //! area error   | |C_h| - |C| |
@@ -9,12 +10,15 @@
 //! Hausdorff    max( sup_{x in C \ C_h} dist(x, C_h),  sup_{x in C_h \ C} dist(x, C) ),   0 if both are empty, none if one is
 //! ```
 //!
-//! Both sets are taken as unions of convex parts of elements (`cut`): D_j exactly, C with straight lines in pieces of diameter d <= h/3 that its border crosses. A border of
-//! length L and curvature k costs at most L k d^2/12 in the areas and k d^2/8 in the distance; the distance itself is found to 1/1024 of itself or of the element's diameter. A part of C thinner than half an
-//! element (and than 1/2000 of the domain in area) may fall between the samples, and a set without area, such as a segment or a point, counts as empty.
+//! Both sets are taken as unions of convex parts of elements (`cut`): D_j exactly, C with straight lines in pieces of
+//! diameter d <= h/3 that its border crosses. A border of length L and curvature k costs at most L k d^2/12 in the areas and
+//! k d^2/8 in the distance; the distance itself is found to 1/1024 of itself or of the element's diameter. A part of C
+//! thinner than half an element (and than 1/2000 of the domain in area) may fall between the samples, and a set without
+//! area, such as a segment or a point, counts as empty.
 //!
-//! Dual cells of boundary vertices never belong to C_h, since the discrete problem has no multiplier there: where C reaches the boundary a strip of a third of an element is missing.
-//! Cost: O(N) samples, O(n log n) for the n parts along both borders.
+//! Dual cells of boundary vertices never belong to C_h, since the discrete problem has no multiplier there: where C reaches
+//! the boundary a strip of about half an element is missing. Cost: O(N) samples, O(n log n) for the n parts along both
+//! borders.
 
 mod cut;
 mod distance;
@@ -201,8 +205,8 @@ impl Sets<'_> {
         border
     }
 
-    /// Segments of C that contain its border: those of the parts of elements that are cut, and the edges of whole elements that touch
-    /// others or the boundary.
+    /// Segments of C that contain its border: those of the parts of elements that are cut, and the edges of whole elements
+    /// that touch others or the boundary.
     fn exact_border(&mut self) -> Vec<Segment> {
         let mesh = self.mesh;
         let mut touched = mesh.boundary().to_vec();

@@ -1,14 +1,16 @@
 //! The second discretisation of the paper's conclusions: the action itself as a finite-volume unknown on the dual cells.
 //!
-//! Find u_h in first-order elements and `lambda_h = sum_j l_j chi_Dj` over the interior vertices j, `l_j >= 0`, such that for all v_h
+//! Find u_h in first-order elements and `lambda_h = sum_j l_j chi_Dj` over the interior vertices j, `l_j >= 0`, such that
+//! for all v_h
 //!
 //! ```text
 //! a(u_h, v_h) - sum_j l_j |D_j| (v_1 - v_2)(a_j) = (f, v_h),      w_h(a_j) >= 0,      l_j w_h(a_j) = 0.
 //! ```
 //!
-//! With `z_j = l_j |D_j|` these are the equations of the first discretisation, so the displacements are the same and [`finite_volume`] needs no solve:
-//! no second Poisson problem for sigma_h either. The action is another one: a function, constant on every dual cell, where the first method has -laplace sigma_h, a
-//! measure on the edges with negative parts. Its error is measured in L2 ([`FiniteVolume::l2_error`]) and, since the action is a functional on H^1_0, in H^-1
+//! With `z_j = l_j |D_j|` these are the equations of the first discretisation, so the displacements are the same and
+//! [`finite_volume`] needs no solve: no second Poisson problem for sigma_h either. The action is another one: a function,
+//! constant on every dual cell, where the first method has -laplace sigma_h, a measure on the edges with negative parts. Its
+//! error is measured in L2 ([`FiniteVolume::l2_error`]) and, since the action is a functional on H^1_0, in H^-1
 //! ([`FiniteVolume::negative_error`]), which compares with |sigma - sigma_h|_1 of the first method.
 
 mod cells;
@@ -51,8 +53,9 @@ pub fn finite_volume(problem: &DiscreteProblem, solution: &Solution) -> FiniteVo
 impl FiniteVolume {
     /// Puts displacements and action into the discrete problem, whoever computed them.
     ///
-    /// Nothing is taken from the solver: the forms are summed element by element, |D_j| from the sub-triangles, and of the problem only the data are read, which
-    /// are the element means of the tensions, the load integrals (f_i, phi_j) and the boundary.
+    /// Nothing is taken from the solver: the forms are summed element by element, |D_j| from the sub-triangles, and of the
+    /// problem only the data are read, which are the element means of the tensions, the load integrals (f_i, phi_j) and the
+    /// boundary.
     pub fn defect(
         &self,
         mesh: &Mesh,
@@ -110,10 +113,11 @@ impl FiniteVolume {
         cells::l2_error(mesh, &self.action, exact)
     }
 
-    /// The error of the action as a functional: |r_h|_1 with `-laplace r = lambda - lambda_h`, r = 0 on the boundary, in first-order elements on the mesh with every triangle
-    /// divided into four `times` times; a force.
+    /// The error of the action as a functional: |r_h|_1 with `-laplace r = lambda - lambda_h`, r = 0 on the boundary, in
+    /// first-order elements on the mesh with every triangle divided into four `times` times; a force.
     ///
-    /// It grows with `times` towards ||lambda - lambda_h|| in H^-1. On a mesh of a disk the domain is the polygon that the mesh covers.
+    /// It grows with `times` towards ||lambda - lambda_h|| in H^-1. On a mesh of a disk the domain is the polygon that the
+    /// mesh covers.
     ///
     /// # Errors
     /// A value of the exact action that is not finite.

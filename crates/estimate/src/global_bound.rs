@@ -4,15 +4,16 @@
 //! (sum_K sum_i h_K^2 ||f_i - f_ih||_K^2 + eta_K^2)^(1/2)  +  kappa^(1/2) (sum_e eta_e)^(1/2),        kappa = ||f_1|| + ||f_2||       (7.11), (6.2)
 //! ```
 //!
-//! without the constant c in front of the first term. The sum of eta_e tends to a positive constant on every family of meshes, so the
-//! second term stagnates. It is repaired by what its proof needs, b(u - u_h, sigma - sigma_h), with all of the jumps in the root of a sum of squares and
-//! the products of force and gap that are left where the contact set ends:
+//! without the constant c in front of the first term. The sum of eta_e tends to a positive constant on every family of
+//! meshes, so the second term stagnates. It is repaired by what its proof needs, b(u - u_h, sigma - sigma_h), with all of
+//! the jumps in the root of a sum of squares and the products of force and gap that are left where the contact set ends:
 //!
 //! ```text
 //! (sum_e h_e^2 [d_n sigma_h]_e^2)^(1/2)  +  (sum_j z_j (Pi w_h)_j)^(1/2),        (Pi w_h)_j = mean of w_h = u_1h - u_2h over the patch of j.
 //! ```
 //!
-//! The first of these is O(h). The terms of both sums have different units, so they are kept apart here and joined in the user's units only.
+//! The first of these is O(h). The terms of both sums have different units, so they are kept apart here and joined in the
+//! user's units only.
 
 use contact::{DiscreteProblem, Solution};
 use fem_core::scale::{root_times_power_of_two, times_power_of_two};
@@ -122,8 +123,8 @@ mod tests {
     use crate::{oscillation, paper};
 
     fn terms() -> GlobalBound {
-        // sigma is 1 at the centre and 0 around it: h_e [d_n sigma]_e over each of the four inner edges is (grad' - grad) . (1, -1) = -2.
-        // The gap is 1/2 at corner 1, so its mean over the patch of the centre is (2/3 of 1/2)/4.
+        // sigma is 1 at the centre and 0 around it: h_e [d_n sigma]_e over each of the four inner edges is (grad' - grad) .
+        // (1, -1) = -2. The gap is 1/2 at corner 1, so its mean over the patch of the centre is (2/3 of 1/2)/4.
         let mesh = four_triangles();
         let mut problem = problem(&mesh, [vec![1.0; 4], vec![1.0; 4]], [3.0, -4.0]);
         problem.loads[1].deviation_squared = vec![9.0, 0.0, 0.0, 0.0];

@@ -1,12 +1,13 @@
 //! Divides the elements of a mesh into parts that lie in a set and parts that do not; the set is where a field is not zero.
 //!
-//! An element is looked at in its three corners, its edge midpoints and its barycentre. Where they disagree it is divided into the six sub-triangles with these
-//! points as corners (so that no part crosses the border of a dual cell), and these are quartered while their own seven points disagree. The smallest pieces are
-//! cut by a straight line between the points where the border of the set crosses their edges, found by bisection. With
-//! the diameter d of the smallest pieces, at most h/3, the line is off a border of curvature k by at most k d^2/8.
+//! An element is looked at in its three corners, its edge midpoints and its barycentre. Where they disagree it is divided
+//! into the six sub-triangles with these points as corners (so that no part crosses the border of a dual cell), and these
+//! are quartered while their own seven points disagree. The smallest pieces are cut by a straight line between the points
+//! where the border of the set crosses their edges, found by bisection. With the diameter d of the smallest pieces, at most
+//! h/3, the line is off a border of curvature k by at most k d^2/8.
 //!
-//! Points are moved by 2^-20 of their way towards the barycentre of their element before the field is evaluated: strictly inside, on the element's own side of a border that runs along
-//! an edge.
+//! Points are moved by 2^-20 of their way towards the barycentre of their element before the field is evaluated: strictly
+//! inside, on the element's own side of a border that runs along an edge.
 
 use fem_core::{Field, FieldError, Mesh, Samples, Shape, TriangleId};
 
@@ -67,10 +68,12 @@ pub(super) const WHOLE: [Place; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.
 /// The barycentre.
 pub(super) const CENTRE: Place = [1.0 / 3.0; 3];
 
-/// Elements and sub-triangles larger than this share of the domain are divided in any case, so that coarse meshes miss nothing that is not small.
+/// Elements and sub-triangles larger than this share of the domain are divided in any case, so that coarse meshes miss
+/// nothing that is not small.
 const LARGEST_SHARE: f64 = 1.0 / 2000.0;
 
-/// A cut sub-triangle is quartered at least and at most so often; between these until it is no longer than the given share of the domain's extent.
+/// A cut sub-triangle is quartered at least and at most so often; between these until it is no longer than the given share
+/// of the domain's extent.
 const DEPTH: std::ops::Range<u32> = 1..7;
 const FINE: f64 = 1.0 / 256.0;
 

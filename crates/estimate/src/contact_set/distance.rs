@@ -1,7 +1,8 @@
 //! The largest distance from the points of some triangles to a set of segments.
 //!
-//! The distance to one segment is a convex function, so on a triangle the distance to the nearest of all segments is at most the largest of the corners' distances
-//! to any single one of them. Triangles whose bound by the segment nearest to their centre exceeds the largest distance met so far are quartered.
+//! The distance to one segment is a convex function, so on a triangle the distance to the nearest of all segments is at most
+//! the largest of the corners' distances to any single one of them. Triangles whose bound by the segment nearest to their
+//! centre exceeds the largest distance met so far are quartered.
 
 use super::nearest::{Nearest, Segment, squared_distance};
 
@@ -24,8 +25,8 @@ const DEPTH: u32 = 16;
 pub(super) fn largest_distance(sources: &[Source], target: &Nearest) -> Option<f64> {
     let mut largest = 0.0f64;
     let mut stack = Vec::new();
-    // First a look at every triangle, so that the search below starts with a distance that leaves little to divide. Triangles follow each other in space: most
-    // are settled by the segment that was nearest to the last one that was not.
+    // First a look at every triangle, so that the search below starts with a distance that leaves little to divide.
+    // Triangles follow each other in space: most are settled by the segment that was nearest to the last one that was not.
     let mut hint: Option<Segment> = None;
     for source in sources {
         if hint.is_some_and(|segment| source.farthest(&segment) <= largest * (1.0 + ACCURACY)) {

@@ -1,7 +1,7 @@
 //! Distance from a point to the nearest of many segments: a tree of boxes, split at the median.
 //!
-//! Building costs O(n log n), a query O(log n) for points near the segments. Boxes instead of a grid: on a graded mesh the segments
-//! differ in length by many orders.
+//! Building costs O(n log n), a query O(log n) for points near the segments. Boxes instead of a grid: on a graded mesh the
+//! segments differ in length by many orders.
 
 /// A segment by its ends.
 pub(super) type Segment = [[f64; 2]; 2];

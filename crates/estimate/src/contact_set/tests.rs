@@ -67,8 +67,8 @@ fn a_square_across_the_elements() {
     let found = compare(&grid(8, 1.0), |p| inside(p[0], p[1]), inside);
     close(found.area, 25.0 / 16.0, 1e-13);
     close(found.exact_area, 1.44, 1e-5);
-    // The cells reach to 0.5 + 2h/3 = 0.667, the corner (0.6, 0.6) lies in a cell, but (0.6, 0.5 - h/2) does not: there the cells end at
-    // x = 0.5 + h/3. By hand: from the corner's barycentre (2/3, 7/12), 1/15 beyond the side.
+    // The cells reach to 0.5 + 2h/3 = 0.667, the corner (0.6, 0.6) lies in a cell, but (0.6, 0.5 - h/2) does not: there the
+    // cells end at x = 0.5 + h/3. By hand: from the corner's barycentre (2/3, 7/12), 1/15 beyond the side.
     close(found.hausdorff.unwrap(), 1.0 / 15.0, 2e-3);
 }
 
@@ -98,8 +98,8 @@ fn a_disk_inside_a_cell_and_around_it() {
 
 #[test]
 fn areas_and_distances_are_exact_to_a_small_part_of_the_element() {
-    // A circle of radius 0.7 that no vertex knows of; h is the diameter of the elements. The bounds are those of the module head, held even with
-    // d = h/8: 2 pi k d^2/12 and k d^2/8, and for the distance its own accuracy.
+    // A circle of radius 0.7 that no vertex knows of; h is the diameter of the elements. The bounds are those of the module
+    // head, held even with d = h/8: 2 pi k d^2/12 and k d^2/8, and for the distance its own accuracy.
     for n in [8, 32, 128] {
         let (r, h) = (0.7, 8f64.sqrt() / n as f64);
         let circle = move |x: f64, y: f64| x.hypot(y) < r;
@@ -109,8 +109,8 @@ fn areas_and_distances_are_exact_to_a_small_part_of_the_element() {
         println!("{n}: area {error:e}, allowed {:e}", PI * d * d / 6.0);
         assert!(error <= PI * d * d / 6.0, "{n}: {error:e}");
         let star = compare(&grid(n, 1.0), |p| p == [0.0, 0.0], circle);
-        // The cell of the origin is a hexagon with corners such as h_x (1/3, -1/3) and h_x (2/3, 1/3): the side between them, h_x/5^(1/2) away
-        // from the origin, is the one that the circle's points are farthest from.
+        // The cell of the origin is a hexagon with corners such as h_x (1/3, -1/3) and h_x (2/3, 1/3): the side between
+        // them, h_x/5^(1/2) away from the origin, is the one that the circle's points are farthest from.
         let cell = 2.0 / n as f64 / 5f64.sqrt();
         let error = (star.hausdorff.unwrap() - (r - cell)).abs();
         println!(

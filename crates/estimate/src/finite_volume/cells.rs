@@ -122,7 +122,8 @@ pub(super) fn loads(coarse: &Mesh, fine: &Quartered, action: &[f64]) -> Vec<f64>
     sums
 }
 
-/// Entry (a, k): the integral of the hat function of corner k of a fine triangle over the dual cell of corner a of the coarse one, over the coarse area.
+/// Entry (a, k): the integral of the hat function of corner k of a fine triangle over the dual cell of corner a of the
+/// coarse one, over the coarse area.
 fn shares(triangle: &[Place; 3]) -> [[f64; 3]; 3] {
     let whole = area(triangle);
     [0, 1, 2].map(|a| {

@@ -1,7 +1,8 @@
 //! The first-order solution of the Poisson problem on a quartered mesh, by conjugate gradients.
 //!
-//! Preconditioner: the diagonal in the hierarchical basis (Yserentant 1986), which takes hat functions of the mesh on which each vertex was born. The diagonal is that of
-//! the finest mesh: similar triangles have the same stiffness. With two quarterings this takes about a quarter of the steps.
+//! Preconditioner: the diagonal in the hierarchical basis (Yserentant 1986), which takes hat functions of the mesh on which
+//! each vertex was born. The diagonal is that of the finest mesh: similar triangles have the same stiffness. With two
+//! quarterings this takes about a quarter of the steps.
 
 use std::sync::Arc;
 
@@ -10,8 +11,8 @@ use fem_core::assemble::stiffness;
 
 use super::quarter::Quartered;
 
-/// The preconditioned residual falls to this share of the first. The squared seminorm misses at most the square of it, times the condition of the
-/// preconditioned matrix: 1e-7 on a million vertices.
+/// The preconditioned residual falls to this share of the first. The squared seminorm misses at most the square of it, times
+/// the condition of the preconditioned matrix: 1e-7 on a million vertices.
 const REDUCTION: f64 = 1e-6;
 
 /// |r_h|_1 with `K r = load` at the interior vertices and r = 0 on the boundary; entries of `load` on the boundary do not count.

@@ -85,8 +85,9 @@ fn dual_cells_are_integrated_exactly_on_finer_meshes() {
             x += p[0] * s;
             y += p[1] * s;
         }
-        // First moments of the cell of corner (1, 1): two quads, centroid by symmetry on the diagonal. The quad (1,1), (1,0), (2/3,0), (1/2,1/2) has
-        // sub-triangles of area 1/6 with centroids (8/9, 1/3) and (13/18, 1/2): 1/6 (29/18 + 15/18) = 11/27 for x + y, twice that for the cell.
+        // First moments of the cell of corner (1, 1): two quads, centroid by symmetry on the diagonal. The quad (1,1),
+        // (1,0), (2/3,0), (1/2,1/2) has sub-triangles of area 1/6 with centroids (8/9, 1/3) and (13/18, 1/2): 1/6 (29/18 +
+        // 15/18) = 11/27 for x + y, twice that for the cell.
         let moment = 11.0 / 27.0;
         // Corners 1 and 2 lie at x = 1, corners 2 and 3 at y = 1; the action of corner 0 is 0.
         close(y, moment * (-1.0 + 2.0 + 3.0), 1e-13);
