@@ -18,7 +18,7 @@ pub const ACTIVE_SET_LIMIT: f64 = 1e-9;
 pub const INTERIOR_POINT_LIMIT: f64 = 1e-6;
 
 /// Number of vertices from which [`Solver::Auto`] takes multigrid.
-pub const MULTIGRID_FROM: usize = 20_000;
+pub const MULTIGRID_FROM: usize = 10_000;
 
 /// Where rounding allows no better the limits give way, but never beyond this relative KKT residual.
 pub const ROUNDING_LIMIT: f64 = 1e-3;
@@ -224,6 +224,8 @@ fn check(problem: &DiscreteProblem, start: Option<&Start>) -> Result<(), SolveEr
             ("start of the lower membrane", u2),
         ]
     });
+    let sigma = start.and_then(|s| s.sigma.as_ref());
+    let guess = guess.chain(sigma.map(|sigma| ("start of sigma", sigma)));
     for (what, array) in arrays.into_iter().chain(guess) {
         if array.len() != expected {
             return Err(SolveError::Length {

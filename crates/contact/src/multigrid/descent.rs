@@ -213,9 +213,16 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             ratio: None,
             left: None,
         };
-        self.residual();
         let mut losses = Vec::new();
         self.cold = cold;
+        if self.inequality {
+            for (x, &share) in self.x.iter_mut().zip(&self.finest.share) {
+                if U::gap(*x) < 0.0 {
+                    *x = U::close(*x, share);
+                }
+            }
+        }
+        self.residual();
         if cold && self.inequality {
             self.monotone_start()?;
         }
