@@ -99,7 +99,15 @@ fn scenes_with_known_solutions() {
             println!("{name} effectivity: {effectivity}");
             assert!((low..high).contains(&effectivity), "{name}: {effectivity}");
         }
-        assert!(number(&run, "kkt_residual") <= 1e-12, "{name}");
+        // A direct method goes to rounding, multigrid to 1e-10 where nothing else is asked for.
+        let history = run.history();
+        let last = history.last().expect("a level");
+        let solver = last.iter().find(|(name, _)| name == "solver");
+        let limit = match solver.map(|(_, value)| value.as_str()) {
+            Some("multigrid") => 1e-10,
+            _ => 1e-12,
+        };
+        assert!(number(&run, "kkt_residual") <= limit, "{name}");
         assert!(number(&run, "smallest_gap") >= 0.0, "{name}");
     }
 }
