@@ -202,7 +202,7 @@ fn overrides() {
         "upper.load = sin(x, y)",
         "parameters.e=2",
         "domain.disk.radius=1",
-        "solve.solver=multigrid",
+        "estimate.estimator=certified",
         "output.fields=[1",
         "",
     ]

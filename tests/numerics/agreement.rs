@@ -33,7 +33,7 @@ fn scenes() -> Vec<(String, scene::Scene)> {
         .collect()
 }
 
-/// The levels of a scene up to a number of vertices.
+/// The levels of a scene up to a number of vertices, by the active set method.
 fn run(scene: &scene::Scene, vertices: usize) -> Vec<Level> {
     let mut settings = scene.settings.clone();
     settings.stop = Stop {
@@ -41,6 +41,7 @@ fn run(scene: &scene::Scene, vertices: usize) -> Vec<Level> {
         ..Stop::default()
     };
     settings.output.fields = Fields::None;
+    settings.solve.solver = Solver::ActiveSet;
     levels(&scene.problem, &settings)
 }
 

@@ -116,7 +116,14 @@ fn scenes_with_known_solutions() {
             certificate["guaranteed"], known.guaranteed,
             "{name}: {certificate}"
         );
-        assert!(number(&run, "kkt_residual") <= 1e-12, "{name}");
+        // A direct method goes to rounding, multigrid as far as the bound needs.
+        let algebraic = number(&run, "eta_alg") / number(&run, "error_bound");
+        if summary["solver"] == "multigrid" {
+            assert!(algebraic <= 0.1, "{name}: {algebraic}");
+        } else {
+            assert!(number(&run, "kkt_residual") <= 1e-12, "{name}");
+            assert!(algebraic <= 1e-8, "{name}: {algebraic}");
+        }
         assert!(number(&run, "smallest_gap") >= 0.0, "{name}");
     }
 }

@@ -139,7 +139,7 @@ fn a_tolerance_out_of_reach_is_refused_with_the_residual() {
         let settings = Settings {
             solver,
             tolerance: Tolerance::Relative(1e-30),
-            reduce: true,
+            ..Settings::default()
         };
         match solve(&problem, &settings, None) {
             Err(SolveError::NotConverged {

@@ -213,9 +213,16 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             ratio: None,
             left: None,
         };
-        self.residual();
         let mut losses = Vec::new();
         self.cold = cold;
+        if self.inequality {
+            for (x, &d) in self.x.iter_mut().zip(&self.finest.diagonal) {
+                if U::gap(*x) < 0.0 {
+                    *x = U::close(*x, U::share(d));
+                }
+            }
+        }
+        self.residual();
         if cold && self.inequality {
             self.monotone_start()?;
         }
@@ -289,13 +296,13 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                 let r = self.r[p];
                 let mut contact = false;
                 if U::gap(self.x[p]) <= 0.0 {
-                    let pull = U::pull(r, self.finest.share[p]);
+                    let pull = U::pull(r, self.finest.share(p));
                     contact = pull <= 0.0 || pull <= RELEASE * self.row_scale(p);
                 }
                 changed |= contact != self.contact[p];
                 self.contact[p] = contact;
                 self.scratch[p] = if contact {
-                    U::gather(r, self.finest.share[p])
+                    U::gather(r, self.finest.share(p))
                 } else {
                     r
                 };

@@ -11,8 +11,6 @@ pub(crate) struct Finest<U: Unknowns> {
     pub slot: Vec<U::Plain>,
     /// Diagonal of every rank; that of boundary vertices too.
     pub diagonal: Vec<U::Plain>,
-    /// Share of the upper membrane in the diagonal of every rank.
-    pub share: Vec<f64>,
 }
 
 impl<U: Unknowns> Finest<U> {
@@ -38,12 +36,13 @@ impl<U: Unknowns> Finest<U> {
             .iter()
             .map(|&j| entry(pattern.diagonal_position(j as usize)))
             .collect();
-        let share = diagonal.iter().map(|&d| U::share(d)).collect();
-        Finest {
-            slot,
-            diagonal,
-            share,
-        }
+        Finest { slot, diagonal }
+    }
+
+    /// Share of the upper membrane in the stiffness at a rank.
+    #[inline]
+    pub fn share(&self, p: usize) -> f64 {
+        U::share(self.diagonal[p])
     }
 
     /// y = A x over inner vertices; x is 0 on the boundary, y there is meaningless.

@@ -96,7 +96,8 @@ impl<U: Unknowns> Levels<U> {
     /// The truncated matrix of the finest mesh.
     fn fill(&mut self, hierarchy: &Hierarchy, finest: &Finest<U>, contact: &[bool]) {
         let n0 = hierarchy.initial();
-        let glued = |q: usize| contact[q].then(|| finest.share[q]);
+        let free = !contact.contains(&true);
+        let glued = |q: usize| (!free && contact[q]).then(|| finest.share(q));
         for p in 0..hierarchy.len() {
             self.pivot[p] = if hierarchy.fixed[p] {
                 U::Pivot::default()

@@ -12,6 +12,8 @@ mod finest;
 mod galerkin;
 mod hierarchy;
 mod step;
+#[cfg(test)]
+mod tests;
 mod unknowns;
 
 use fem_core::SymmetricMatrix;
@@ -266,14 +268,17 @@ impl Run<'_> {
                 continue;
             }
             vectors.x[p] = own;
-            let mut b = U::value(|i| load(i, j));
+            vectors.b[p] = U::value(|i| load(i, j));
+        }
+        for &p in &self.hierarchy.boundary {
+            let j = self.hierarchy.vertex[p as usize] as usize;
+            let own = U::value(|i| values[i][j]);
             for (at, &k) in pattern.range(j).zip(pattern.columns(j)) {
-                if boundary[k as usize] {
-                    let a = U::plain(|i| -matrices[i].values()[at]);
-                    b = U::plus_plain(b, a, U::value(|i| values[i][k as usize]));
+                if !boundary[k as usize] {
+                    let b = &mut vectors.b[self.hierarchy.rank[k as usize] as usize];
+                    *b = U::plus_plain(*b, U::plain(|i| -matrices[i].values()[at]), own);
                 }
             }
-            vectors.b[p] = b;
         }
         vectors
     }

@@ -48,7 +48,7 @@ impl<U: Unknowns> Descent<'_, U> {
         if self.curvature.is_some() {
             for p in 0..self.contact.len() {
                 if self.contact[p] {
-                    self.direction[p] = U::spread(self.direction[p], self.finest.share[p]);
+                    self.direction[p] = U::spread(self.direction[p], self.finest.share(p));
                 }
             }
             self.multiply_direction();
@@ -65,9 +65,9 @@ impl<U: Unknowns> Descent<'_, U> {
             .cycle(self.hierarchy, &mut self.scratch, &mut self.correction);
         if self.inequality {
             let rows = self.correction.iter_mut().zip(&self.contact);
-            for ((c, &contact), &share) in rows.zip(&self.finest.share) {
+            for ((c, &contact), &d) in rows.zip(&self.finest.diagonal) {
                 if contact {
-                    *c = U::spread(*c, share);
+                    *c = U::spread(*c, U::share(d));
                 }
             }
         }
@@ -93,7 +93,7 @@ impl<U: Unknowns> Descent<'_, U> {
             *r = U::plus(*r, -length, y);
             *x = moved;
             if self.inequality && U::gap(moved) < 0.0 {
-                *x = U::close(moved, self.finest.share[p]);
+                *x = U::close(moved, self.finest.share(p));
                 closed.push((p, U::plus(*x, -1.0, moved), *r));
             }
         }
@@ -109,7 +109,7 @@ impl<U: Unknowns> Descent<'_, U> {
             for ((p, x), &d) in before.iter_mut().enumerate().zip(&self.direction) {
                 *x = U::plus(*x, -length, d);
                 if U::gap(*x) < 0.0 {
-                    *x = U::close(*x, self.finest.share[p]);
+                    *x = U::close(*x, self.finest.share(p));
                 }
             }
             let total = loss + self.monotone()?;
@@ -178,7 +178,7 @@ impl<U: Unknowns> Descent<'_, U> {
             // Two values that were brought together differ by rounding.
             let rounding = CLOSED * (U::size(self.x[p]) + U::size(self.correction[p]));
             let new = if U::gap(x) <= rounding {
-                U::close(x, self.finest.share[p])
+                U::close(x, self.finest.share(p))
             } else {
                 x
             };

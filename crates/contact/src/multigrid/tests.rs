@@ -1,0 +1,334 @@
+//! The parts of multigrid against dense matrices: every shortcut beside what it stands for.
+
+use fem_core::{Children, Mesh};
+
+use super::finest::Finest;
+use super::galerkin::Levels;
+use super::hierarchy::Hierarchy;
+use super::unknowns::{Pair, Scalar, Unknowns};
+use crate::common::{Data, Random, distorted};
+use crate::problem::DiscreteProblem;
+
+/// A graded mesh of a distorted initial one, with variable tensions.
+fn problem(levels: usize) -> DiscreteProblem {
+    let mut mesh: Mesh = distorted(3, 0.3, 7);
+    let mut random = Random(11);
+    for _ in 0..levels {
+        let marked: Vec<_> = mesh
+            .triangle_ids()
+            .filter(|_| random.next() < 0.25)
+            .collect();
+        mesh.refine(&marked, Children::Two).unwrap();
+    }
+    let data = Data {
+        tensions: [&|x, y| 1.0 + 0.5 * x * y, &|x, _| {
+            if x > 0.2 { 30.0 } else { 2.0 }
+        }],
+        loads: [&|_, _| -1.0, &|_, _| 0.0],
+        heights: [&|_, _| 0.1, &|_, _| 0.0],
+    };
+    data.on(&mesh)
+}
+
+/// Random contact, about half of the inner vertices.
+fn contact(hierarchy: &Hierarchy, random: &mut Random) -> Vec<bool> {
+    (0..hierarchy.len())
+        .map(|p| !hierarchy.fixed[p] && random.next() < 0.5)
+        .collect()
+}
+
+fn values<U: Unknowns>(hierarchy: &Hierarchy, random: &mut Random) -> Vec<U::Value> {
+    (0..hierarchy.len())
+        .map(|p| {
+            let v = [random.between(-1.0, 1.0), random.between(-1.0, 1.0)];
+            U::value(|i| if hierarchy.fixed[p] { 0.0 } else { v[i] })
+        })
+        .collect()
+}
+
+fn dot<U: Unknowns>(x: &[U::Value], y: &[U::Value]) -> f64 {
+    x.iter().zip(y).map(|(&a, &b)| U::dot(a, b)).sum()
+}
+
+/// The truncation T of values of the finest mesh.
+fn truncate<U: Unknowns>(finest: &Finest<U>, contact: &[bool], x: &mut [U::Value]) {
+    for p in 0..x.len() {
+        if contact[p] {
+            x[p] = U::spread(x[p], finest.share(p));
+        }
+    }
+}
+
+fn finest<U: Unknowns>(problem: &DiscreteProblem, hierarchy: &Hierarchy) -> Finest<U> {
+    let matrices: Vec<_> = problem.stiffness.iter().take(U::WIDTH).collect();
+    Finest::new(hierarchy, &matrices)
+}
+
+#[test]
+fn levels_are_prefixes_and_every_edge_has_its_slot() {
+    for levels in [0, 1, 9] {
+        let problem = problem(levels);
+        let h = Hierarchy::new(&problem);
+        assert_eq!(h.around.len(), h.quad.len());
+        assert_eq!(h.level.last(), Some(&(h.len() as u32)));
+        for p in 0..h.len() {
+            let j = h.vertex[p] as usize;
+            assert_eq!(h.rank[j] as usize, p);
+            let level = problem.genealogy[j].level as usize;
+            assert!(h.ranks(level).contains(&p));
+            let mut seen = 0;
+            for &k in problem.pattern.columns(j) {
+                let q = h.rank[k as usize] as usize;
+                if q < p {
+                    assert!(h.slot(p, q).is_some_and(|s| s < h.slots() - 1));
+                    seen += 1;
+                }
+            }
+            assert!(p < h.initial() || seen <= 4);
+        }
+        // Old rows: the inner parents of the level, once each.
+        for level in 1..=h.depth() {
+            let mut parents: Vec<u32> = h
+                .ranks(level)
+                .flat_map(|p| h.quad[p - h.initial()][..2].to_vec())
+                .filter(|&q| !h.fixed[q as usize])
+                .collect();
+            parents.sort_unstable();
+            parents.dedup();
+            let mut rows = h.old_vertex[h.old_rows(level)].to_vec();
+            rows.sort_unstable();
+            assert_eq!(rows, parents);
+        }
+    }
+}
+
+#[test]
+fn the_product_is_that_of_the_matrix() {
+    let problem = problem(7);
+    let h = Hierarchy::new(&problem);
+    let finest = finest::<Pair>(&problem, &h);
+    let x = values::<Pair>(&h, &mut Random(3));
+    let mut y = vec![[0.0; 2]; h.len()];
+    finest.multiply(&h, &x, &mut y);
+    for i in 0..2 {
+        let plain: Vec<f64> = h.rank.iter().map(|&p| x[p as usize][i]).collect();
+        for p in (0..h.len()).filter(|&p| !h.fixed[p]) {
+            let j = h.vertex[p] as usize;
+            let exact = problem.stiffness[i].row_dot(j, &plain);
+            let scale = problem.stiffness[i].row_dot_abs(j, &plain);
+            assert!((y[p][i] - exact).abs() <= 1e-15 * scale.max(1.0));
+        }
+    }
+}
+
+/// Prolongs a value at one rank of a level to the finest mesh.
+fn hat<U: Unknowns>(h: &Hierarchy, level: usize, rank: usize, i: usize) -> Vec<U::Value> {
+    let zero = U::value(|_| 0.0);
+    let mut x = vec![zero; h.len()];
+    x[rank] = U::value(|k| f64::from(k == i));
+    for p in h.level[level + 1] as usize..h.len() {
+        let [a, b, ..] = h.quad[p - h.initial()].map(|q| q as usize);
+        let mean = |q: usize| if h.fixed[q] { zero } else { x[q] };
+        if !h.fixed[p] {
+            x[p] = U::plus(U::plus(zero, 0.5, mean(a)), 0.5, mean(b));
+        }
+    }
+    x
+}
+
+/// Every stored row of every level is the Galerkin product of truncated hat functions.
+fn galerkin<U: Unknowns>(contact_seed: Option<u64>) {
+    let problem = problem(6);
+    let h = Hierarchy::new(&problem);
+    let finest = finest::<U>(&problem, &h);
+    let contact = match contact_seed {
+        Some(seed) => contact(&h, &mut Random(seed)),
+        None => vec![false; h.len()],
+    };
+    let mut levels = Levels::<U>::new(&h);
+    levels.sweep(&h, &finest, &contact).unwrap();
+    let function = |level: usize, rank: usize, i: usize| {
+        let mut x = hat::<U>(&h, level, rank, i);
+        truncate(&finest, &contact, &mut x);
+        x
+    };
+    let entry = |x: &[U::Value], y: &[U::Value]| {
+        let mut image = vec![U::value(|_| 0.0); h.len()];
+        finest.multiply(&h, y, &mut image);
+        h.clear_fixed(&mut image);
+        dot::<U>(x, &image)
+    };
+    let n0 = h.initial();
+    let mut compared = 0;
+    for level in 1..=h.depth() {
+        for p in h.ranks(level).filter(|&p| !h.fixed[p]) {
+            for (k, &q) in h.quad[p - n0].iter().enumerate() {
+                for (i, j) in [(0, 0), (0, U::WIDTH - 1), (U::WIDTH - 1, 0)] {
+                    if !h.fixed[q as usize] {
+                        let exact = entry(&function(level, p, i), &function(level, q as usize, j));
+                        let found = U::coupling_at(levels.coupling[4 * (p - n0) + k], i, j);
+                        assert!((found - exact).abs() < 1e-12, "{found} {exact}");
+                        compared += 1;
+                    }
+                }
+            }
+        }
+        for row in h.old_rows(level) {
+            let q = h.old_vertex[row] as usize;
+            for e in h.old_start[row] as usize..h.old_start[row + 1] as usize {
+                for (i, j) in [(0, 0), (0, U::WIDTH - 1), (U::WIDTH - 1, 0)] {
+                    let other = h.old_column[e] as usize;
+                    let exact = entry(&function(level, q, i), &function(level, other, j));
+                    let found = U::coupling_at(levels.old_coupling[e], i, j);
+                    assert!((found - exact).abs() < 1e-12, "{found} {exact}");
+                    compared += 1;
+                }
+            }
+        }
+    }
+    assert!(compared > 500, "{compared}");
+}
+
+#[test]
+fn rows_of_all_levels_are_galerkin_products() {
+    for contact in [None, Some(1), Some(2)] {
+        galerkin::<Scalar>(contact);
+        galerkin::<Pair>(contact);
+    }
+}
+
+/// The preconditioner is symmetric and positive, and close to the inverse where nothing is truncated.
+fn preconditioner<U: Unknowns>(seed: Option<u64>) {
+    let problem = problem(8);
+    let h = Hierarchy::new(&problem);
+    let finest = finest::<U>(&problem, &h);
+    let mut random = Random(5);
+    let contact = match seed {
+        Some(seed) => contact(&h, &mut Random(seed)),
+        None => vec![false; h.len()],
+    };
+    let mut levels = Levels::<U>::new(&h);
+    levels.sweep(&h, &finest, &contact).unwrap();
+    let gathered = |x: &[U::Value]| -> Vec<U::Value> {
+        (0..x.len())
+            .map(|p| {
+                if contact[p] {
+                    U::gather(x[p], finest.share(p))
+                } else {
+                    x[p]
+                }
+            })
+            .collect()
+    };
+    let mut apply = |r: &[U::Value]| -> Vec<U::Value> {
+        let mut r = gathered(r);
+        let mut c = vec![U::value(|_| 0.0); r.len()];
+        levels.cycle(&h, &mut r, &mut c);
+        truncate(&finest, &contact, &mut c);
+        c
+    };
+    for _ in 0..5 {
+        let x = values::<U>(&h, &mut random);
+        let y = values::<U>(&h, &mut random);
+        let (bx, by) = (apply(&x), apply(&y));
+        let (one, other) = (dot::<U>(&bx, &y), dot::<U>(&x, &by));
+        let scale = (dot::<U>(&bx, &x) * dot::<U>(&by, &y)).sqrt();
+        assert!((one - other).abs() <= 1e-11 * scale, "{one} {other}");
+        assert!(dot::<U>(&bx, &x) > 0.0);
+        // Energies of B A lie in (0, 1]: a symmetric cycle never overshoots.
+        let mut v = y.clone();
+        truncate(&finest, &contact, &mut v);
+        let mut av = vec![U::value(|_| 0.0); v.len()];
+        finest.multiply(&h, &v, &mut av);
+        h.clear_fixed(&mut av);
+        let bav = apply(&av);
+        let ratio = dot::<U>(&av, &bav) / dot::<U>(&v, &av);
+        assert!(ratio > 0.0 && ratio <= 1.0 + 1e-10, "{ratio}");
+    }
+}
+
+#[test]
+fn the_cycle_is_symmetric_and_does_not_overshoot() {
+    for seed in [None, Some(1), Some(2)] {
+        preconditioner::<Scalar>(seed);
+        preconditioner::<Pair>(seed);
+    }
+}
+
+/// Monotone cycles keep the bounds and lower the energy, each time.
+fn monotone<U: Unknowns>() {
+    let problem = problem(8);
+    let h = Hierarchy::new(&problem);
+    let finest = finest::<U>(&problem, &h);
+    let none = vec![false; h.len()];
+    let mut levels = Levels::<U>::new(&h);
+    levels.sweep(&h, &finest, &none).unwrap();
+    let mut random = Random(9);
+    let load = values::<U>(&h, &mut random);
+    let mut x = vec![U::value(|_| 0.0); h.len()];
+    let mut last = 0.0;
+    for cycle in 0..6 {
+        let mut image = x.clone();
+        finest.multiply(&h, &x, &mut image);
+        h.clear_fixed(&mut image);
+        let energy = 0.5 * dot::<U>(&x, &image) - dot::<U>(&x, &load);
+        assert!(
+            energy < last || cycle == 0,
+            "cycle {cycle}: {energy} {last}"
+        );
+        last = energy;
+        let mut r: Vec<U::Value> = load
+            .iter()
+            .zip(&image)
+            .map(|(&b, &y)| U::plus(b, -1.0, y))
+            .collect();
+        let mut bound: Vec<f64> = x.iter().map(|&x| -U::gap(x).max(0.0)).collect();
+        let mut c = x.clone();
+        levels.monotone_cycle(&h, &mut r, &mut c, &mut bound, &mut Vec::new());
+        let mut closed = 0;
+        for p in 0..x.len() {
+            x[p] = U::plus(x[p], 1.0, c[p]);
+            assert!(U::gap(x[p]) >= -1e-14, "{}", U::gap(x[p]));
+            closed += usize::from(!h.fixed[p] && U::gap(x[p]).abs() <= 1e-14);
+        }
+        assert!(closed > 0 && closed < h.len());
+    }
+    assert!(last < 0.0);
+}
+
+#[test]
+fn monotone_cycles_are_monotone() {
+    monotone::<Scalar>();
+    monotone::<Pair>();
+}
+
+#[test]
+fn inverses_of_pairs() {
+    let plain = [3.0, 0.5];
+    let times = |d: [f64; 3], y: [f64; 2]| Pair::times(d, y);
+    // Regular, with one empty field, and empty.
+    let full = Pair::inverse([2.0, 0.3, 0.4], plain);
+    let back = times(full, times([2.0, 0.3, 0.4], [0.7, -1.1]));
+    assert!((back[0] - 0.7).abs() < 1e-15 && (back[1] + 1.1).abs() < 1e-15);
+    assert_eq!(Pair::inverse([2.0, 0.0, 1e-12], plain), [0.5, 0.0, 0.0]);
+    assert_eq!(Pair::inverse([0.0; 3], plain), [0.0; 3]);
+    // Glued: of rank one, also with tensions far apart.
+    for ratio in [1.0, 1e6, 1e-6] {
+        let plain = [4.0, 4.0 * ratio];
+        let share = Pair::share(plain);
+        let glued = Pair::truncated_pivot(plain, Some(share));
+        let inverse = Pair::inverse(glued, plain);
+        // On the range, D D+ D = D.
+        for y in [[1.0, 0.0], [0.0, 1.0]] {
+            let d = times(glued, y);
+            let again = times(glued, times(inverse, d));
+            for i in 0..2 {
+                assert!((again[i] - d[i]).abs() <= 1e-9 * plain[i].max(d[i].abs()));
+            }
+        }
+        // The kernel is left alone.
+        let kernel = [1.0 - share, -share];
+        let moved = times(inverse, times(glued, kernel));
+        assert!(moved[0].abs() + moved[1].abs() < 1e-12);
+    }
+}
