@@ -163,8 +163,9 @@ impl Estimates {
         let errors = match &problem.exact {
             Some(exact) => Some(estimate::true_errors(
                 mesh,
-                discrete,
-                solution,
+                &discrete.tension_mean,
+                &solution.displacement,
+                &solution.sigma,
                 exact,
                 &problem.tension,
             )?),

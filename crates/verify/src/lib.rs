@@ -1,0 +1,3 @@
+//! x
+mod base64;
+mod vtk;
