@@ -49,6 +49,7 @@ impl<'a> Recomputed<'a> {
         level: usize,
         problem: &Problem,
         settings: &'a Settings,
+        last: bool,
     ) -> Result<Self, FieldError> {
         let scale = problem.scale;
         let wants = |e| settings.estimate.wants(e);
@@ -66,7 +67,7 @@ impl<'a> Recomputed<'a> {
         Ok(Recomputed {
             paper: wants(Estimator::Paper).then(|| paper(discrete)),
             residual: wants(Estimator::Residual).then(|| residual(discrete)),
-            certificate: certificate(discrete),
+            certificate: certificate(discrete, problem, settings, last),
             oscillation: oscillation(discrete),
             errors: errors.transpose()?,
             discrete,

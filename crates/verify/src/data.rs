@@ -10,8 +10,6 @@ use crate::element::{Element, elements};
 pub(crate) struct Discrete<'a> {
     /// The mesh of the file.
     pub mesh: &'a Mesh,
-    /// The scene.
-    pub problem: &'a Problem,
     /// Its triangles.
     pub elements: Vec<Element>,
     /// Element means of the tensions.
@@ -49,7 +47,7 @@ impl<'a> Discrete<'a> {
     ///
     /// # Errors
     /// A value of the data that is not finite.
-    pub fn new(mesh: &'a Mesh, problem: &'a Problem, nodal: Nodal) -> Result<Self, FieldError> {
+    pub fn new(mesh: &'a Mesh, problem: &Problem, nodal: Nodal) -> Result<Self, FieldError> {
         let elements = elements(mesh);
         let mut dual_area = vec![0.0; mesh.vertex_count()];
         for e in &elements {
@@ -68,7 +66,6 @@ impl<'a> Discrete<'a> {
                 heights(mesh, &*problem.height[1])?,
             ],
             mesh,
-            problem,
             elements,
             dual_area,
             displacement: nodal.displacement,

@@ -107,11 +107,6 @@ fn mesh(fields: &LevelFields, scene: &Scene) -> Result<Mesh, LevelError> {
 }
 
 impl LevelFile {
-    /// The mesh.
-    pub fn mesh(&self) -> &Mesh {
-        &self.mesh
-    }
-
     /// The data of the scene on the mesh, and the nodal fields of the file, scaled.
     ///
     /// # Errors

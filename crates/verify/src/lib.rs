@@ -88,7 +88,7 @@ pub fn verify(path: &Path) -> Result<Report, VerifyError> {
         };
         let level = discrete.as_ref().map_err(Clone::clone).and_then(|discrete| match discrete {
             Some(discrete) => {
-                Recomputed::new(discrete, number, &scene.problem, &scene.settings).map(Some)
+                Recomputed::new(discrete, number, &scene.problem, &scene.settings, last).map(Some)
             }
             None => Ok(None),
         });
@@ -113,6 +113,8 @@ pub fn verify(path: &Path) -> Result<Report, VerifyError> {
             }
         }
         if last {
+            let certificate = level.as_ref().and_then(|l| l.certificate.as_ref());
+            certificate::check_summary(&summary, certificate, &mut report);
             ending::check_last(&scene.settings, &summary, &history, level.as_ref(), &mut report);
         } else {
             ending::check_earlier(&scene.settings, number, &history, level.as_ref(), &mut report);

@@ -4,7 +4,7 @@ use std::fmt;
 
 use fem_core::scale::times_power_of_two;
 
-use crate::number::{Number, SPACING, TOLERANCE, largest};
+use crate::number::{Number, TOLERANCE, largest};
 
 /// A claim of a run that does not hold.
 #[derive(Clone, Debug, PartialEq)]

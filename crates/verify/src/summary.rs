@@ -4,6 +4,7 @@ use adapt::output::folder::{HISTORY, SERIES, SUMMARY, level_file};
 use scene::Scene;
 use serde_json::{Map, Value};
 
+use crate::certificate;
 use crate::columns::{COLUMNS, Recomputed};
 use crate::error::VerifyError;
 use crate::folder::Folder;
@@ -51,9 +52,10 @@ pub(crate) fn check_text(
             }
         }
     }
+    let known = |key: &str| key == certificate::KEY || KEYS.contains(&key);
     let unknown = summary
         .keys()
-        .find(|key| !KEYS.contains(&key.as_str()) && !COLUMNS.iter().any(|(name, _)| name == key));
+        .find(|key| !known(key) && !COLUMNS.iter().any(|(name, _)| name == key));
     let unknown = unknown.map(|key| format!("`{key}` is not known to this version"));
     report.property(SUMMARY, "keys", unknown);
     let missing = KEYS.iter().copied().chain(COLUMNS.iter().map(|(name, _)| *name));
