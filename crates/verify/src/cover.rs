@@ -157,7 +157,7 @@ impl<'a> Cover<'a> {
         // Areas halve but for the rounding of coordinates, and next to a circle.
         let off = |t: usize| {
             let Some(r) = home[t] else { return true };
-            let since = generation[t] - i64::from(self.initial.generation()[r]);
+            let since = generation[t].saturating_sub(i64::from(self.initial.generation()[r]));
             let halvings = (roots[r].area / leaves[t].area).log2();
             let rounding = SPACINGS * f64::EPSILON * far * leaves[t].diameter / leaves[t].area;
             let allowed = match self.mesh.curve() {

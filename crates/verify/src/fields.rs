@@ -1,6 +1,7 @@
 //! The fields of a level as its file gives them.
 
 use crate::error::LevelError;
+use crate::number::largest;
 use crate::vtk::VtkFile;
 
 /// What `level_NNNN.vtu` holds, in the user's units.
@@ -86,6 +87,25 @@ impl LevelFields {
             generation: integer("CellData", "generation", count)?,
             region: integer("CellData", "region", count)?,
         })
+    }
+
+    /// An array so small that doubles hold fewer digits of it, from which nothing can be recomputed.
+    pub fn lost_digits(&self) -> Option<String> {
+        let [u1, u2] = &self.displacement;
+        let flat = self.points.as_flattened();
+        let arrays: [(&str, &[f64]); 5] = [
+            ("Points", flat),
+            ("u1", u1),
+            ("u2", u2),
+            ("sigma", &self.sigma),
+            ("action_force", &self.force),
+        ];
+        let tiny = |values: &[f64]| {
+            let size = largest(values);
+            size > 0.0 && size < f64::MIN_POSITIVE / f64::EPSILON
+        };
+        let found = arrays.iter().find(|(_, values)| tiny(values))?;
+        Some(format!("the values of `{}` are too small for doubles to hold all digits", found.0))
     }
 
     /// A cell array of doubles, if it is there.

@@ -70,7 +70,7 @@ pub(crate) fn read(
     });
     match built {
         Ok(level) => {
-            report.property(&name, "fields", None);
+            report.property(&name, "fields", level.fields.lost_digits());
             Ok(Some(level))
         }
         Err(why) => {
