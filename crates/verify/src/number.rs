@@ -40,8 +40,9 @@ impl Number {
             return None;
         }
         let value = self.value / divisor.value;
-        let relative = |n: Number| if n.slack == 0.0 { 0.0 } else { n.slack / n.value.abs() };
-        let slack = value.abs() * (TOLERANCE + relative(self) + relative(divisor));
+        // What rounding adds to the common tolerance.
+        let beyond = |n: Number| (n.slack / n.value.abs() - TOLERANCE).max(0.0);
+        let slack = value.abs() * (TOLERANCE + beyond(self) + beyond(divisor));
         Some(Number {
             value,
             // 0/x: whatever the numerator may be over the divisor.
@@ -108,6 +109,8 @@ mod tests {
         assert_eq!(q.exponent, -3);
         assert!(times_power_of_two(q.slack, 0) > 4e-13);
         assert_eq!(n.over(Number::plain(0.0, 0)), None);
+        let q = Number::plain(6.0, 0).over(Number::plain(2.0, 0)).unwrap();
+        assert!(q.agrees(3.0 * (1.0 + 0.9e-9)) && !q.agrees(3.0 * (1.0 + 1.1e-9)));
     }
 
     #[test]

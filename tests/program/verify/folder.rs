@@ -38,16 +38,15 @@ impl Copy {
     }
 
     /// Changes a file as text.
-    pub fn text(&self, name: &str, change: impl FnOnce(String) -> String) -> &Copy {
+    pub fn text(&self, name: &str, change: impl FnOnce(String) -> String) {
         let before = fs::read_to_string(self.file(name)).expect("text");
         let after = change(before.clone());
         assert_ne!(before, after, "nothing was changed in {name}");
         fs::write(self.file(name), after).expect("written");
-        self
     }
 
-    pub fn replace(&self, name: &str, from: &str, to: &str) -> &Copy {
-        self.text(name, |text| text.replacen(from, to, 1))
+    pub fn replace(&self, name: &str, from: &str, to: &str) {
+        self.text(name, |text| text.replacen(from, to, 1));
     }
 
     /// Changes the bytes of an array of a VTK file, and takes its stated range away.
@@ -72,22 +71,20 @@ impl Copy {
     }
 
     /// Changes an array of doubles.
-    pub fn reals(&self, name: &str, array: &str, change: impl FnOnce(&mut Vec<f64>)) -> &Copy {
+    pub fn reals(&self, name: &str, array: &str, change: impl FnOnce(&mut Vec<f64>)) {
         self.bytes(name, array, |bytes| {
             let (rows, _) = bytes.as_chunks_mut::<8>();
             let mut values: Vec<f64> = rows.iter().map(|r| f64::from_le_bytes(*r)).collect();
             change(&mut values);
             rows.iter_mut().zip(values).for_each(|(r, v)| *r = v.to_le_bytes());
         });
-        self
     }
 
     /// Changes one entry of an array of integers of N bytes.
-    pub fn integer<const N: usize>(&self, name: &str, array: &str, at: usize, value: u64) -> &Copy {
+    pub fn integer<const N: usize>(&self, name: &str, array: &str, at: usize, value: u64) {
         self.bytes(name, array, |bytes| {
             bytes.as_chunks_mut::<N>().0[at].copy_from_slice(&value.to_le_bytes()[..N]);
         });
-        self
     }
 
     /// The doubles of an array.
@@ -104,7 +101,7 @@ impl Copy {
         decode(&text[find(&text, array).data])[8..].to_vec()
     }
 
-    pub fn summary(&self, change: impl FnOnce(&mut Value)) -> &Copy {
+    pub fn summary(&self, change: impl FnOnce(&mut Value)) {
         self.text("summary.json", |text| {
             let mut summary: Value = serde_json::from_str(&text).expect("JSON");
             change(&mut summary);
@@ -113,7 +110,7 @@ impl Copy {
     }
 
     /// Changes a column of one level in the history, and in the summary if it is the last.
-    pub fn column(&self, level: usize, name: &str, value: &str) -> &Copy {
+    pub fn column(&self, level: usize, name: &str, value: &str) {
         let mut last = false;
         self.text("history.csv", |text| {
             let mut rows: Vec<Vec<String>> = text
@@ -130,20 +127,19 @@ impl Copy {
             let value = serde_json::from_str(value).unwrap_or_else(|_| Value::from(value));
             self.summary(|summary| summary[name] = value);
         }
-        self
     }
 
     /// Scales a number of one level in the history, and in the summary if it is the last.
-    pub fn scale_column(&self, level: usize, name: &str, factor: f64) -> &Copy {
+    pub fn scale_column(&self, level: usize, name: &str, factor: f64) {
         let text = fs::read_to_string(self.file("history.csv")).expect("text");
         let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
         let column = rows[0].iter().position(|n| *n == name).expect("a column");
         let value: f64 = rows[level + 1][column].parse().expect("a number");
-        self.column(level, name, &format!("{:?}", value * factor))
+        self.column(level, name, &format!("{:?}", value * factor));
     }
 
     /// Makes the checksums those of the files as they are.
-    pub fn fit(&self) -> &Copy {
+    pub fn fit(&self) {
         let text = fs::read_to_string(self.file("summary.json")).expect("text");
         let mut summary: Value = serde_json::from_str(&text).expect("JSON");
         for (name, sum) in summary["checksums"].as_object_mut().expect("checksums") {
@@ -152,7 +148,6 @@ impl Copy {
             }
         }
         fs::write(self.file("summary.json"), format!("{summary:#}\n")).expect("written");
-        self
     }
 }
 

@@ -44,7 +44,7 @@ fn every_way_to_run_a_scene() {
         ("square", &["output.fields=2", "stop.levels=4"], 3),
         ("square", &["estimate.estimator=\"paper\"", "stop.relative_error=1.0"], 1),
         ("square", &["estimate.estimator=\"paper\"", "estimate.also=[]", "output.edges=true", "stop.levels=2"], 1),
-        ("square", &["estimate.also=[]", "output.edges=true", "stop.levels=2"], 1),
+        ("square", &["estimate.also=[]", "stop.levels=2"], 1),
         ("square", &["stop.error=3.0"], 1),
         ("square", &["stop.seconds=1e-9"], 1),
         ("square", &["solve.solver=\"clarabel\"", "output.fields=\"all\"", "stop.levels=3"], 3),
