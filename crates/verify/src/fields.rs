@@ -39,6 +39,8 @@ pub(crate) struct LevelFields {
 const POINT: [&str; 7] = ["u1", "u2", "gap", "sigma", "action_force", "action", "contact"];
 /// Cell arrays of doubles; which of them must be there depends on the scene.
 const CELL: [&str; 7] = ["eta_K", "eta_e", "residual", "certified", "oscillation", "f1_h", "f2_h"];
+/// Values of the whole file.
+const FIELD: [&str; 2] = ["level", "error_bound"];
 /// The rest of the cell arrays.
 const INTEGER: [&str; 2] = ["generation", "region"];
 
@@ -56,6 +58,8 @@ impl LevelFields {
         let count = file.count("NumberOfCells")?;
         known(file, "PointData", &POINT)?;
         known(file, "CellData", &[&CELL[..], &INTEGER[..]].concat())?;
+        known(file, "Cells", &["connectivity", "offsets", "types"])?;
+        known(file, "FieldData", &FIELD)?;
         let need = |name: &str| format!("the array `{name}` is missing");
         let point = |name: &str| file.real("PointData", name, vertices)?.ok_or_else(|| need(name));
         let integer = |place: &str, name: &str, length: usize| {
@@ -144,6 +148,8 @@ impl EdgeFields {
         let count = file.count("NumberOfLines")?;
         known(file, "PointData", &[])?;
         known(file, "CellData", &["eta_e"])?;
+        known(file, "Lines", &["connectivity", "offsets"])?;
+        known(file, "FieldData", &FIELD)?;
         let need = |name: &str| format!("the array `{name}` is missing");
         let integer = |place: &str, name: &str, length: usize| {
             file.integer(place, name, length)?.ok_or_else(|| need(name))
@@ -173,6 +179,7 @@ fn times(count: usize, by: usize) -> Result<usize, String> {
 
 /// The points without their third coordinate, which must be zero.
 fn points(file: &VtkFile, count: usize) -> Result<Vec<[f64; 2]>, String> {
+    known(file, "Points", &["Points"])?;
     let flat = file
         .real("Points", "Points", times(count, 3)?)?
         .ok_or("the array `Points` is missing")?;

@@ -64,6 +64,7 @@ pub fn verify(path: &Path) -> Result<Report, VerifyError> {
     let mut report = Report::default();
     let mut folder = Folder::open(path)?;
     let summary = folder.summary()?;
+    summary::check_own_sum(&summary, &mut report);
     folder.check_sums(&summary, &mut report)?;
     let scene = read_scene(&folder, &mut report)?;
     let history = read_history(&folder, &mut report)?;

@@ -18,8 +18,8 @@ use crate::number::{TOLERANCE, largest, sum};
 use crate::report::{Report, show};
 
 /// Largest nodal residual, relative to the diagonal entry times the largest sigma: a single value that is wrong by [`TOLERANCE`]
-/// of the largest leaves ten times as much.
-const NODAL: f64 = 0.1 * TOLERANCE;
+/// of the largest leaves a hundred times as much.
+const NODAL: f64 = 0.01 * TOLERANCE;
 
 /// Rounding of the terms of a nodal residual, in units of the last place.
 const UNITS: f64 = 64.0;

@@ -1,5 +1,7 @@
 //! The claims of `summary.json` beyond those of a level, of the rows of `history.csv`, and of `series.pvd`.
 
+use adapt::output::pvd::write_series;
+use adapt::output::summary::{OWN_SUM, own_sum};
 use adapt::output::folder::{HISTORY, SERIES, SUMMARY, level_file};
 use scene::Scene;
 use serde_json::{Map, Value};
@@ -14,7 +16,7 @@ use crate::report::Report;
 use crate::tables::{Cell, Entry, History, compare};
 
 /// Keys of the summary that are no columns.
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 15] = [
     "outcome",
     "stopped_by",
     "levels",
@@ -29,7 +31,16 @@ const KEYS: [&str; 14] = [
     "machine",
     "not_representable",
     "checksums",
+    OWN_SUM,
 ];
+
+/// The checksum of the rest of the summary.
+pub(crate) fn check_own_sum(summary: &Map<String, Value>, report: &mut Report) {
+    let mut rest = summary.clone();
+    let claimed = rest.shift_remove(OWN_SUM);
+    let claimed = Cell::of_json(claimed.as_ref()).shown();
+    report.same(SUMMARY, OWN_SUM, claimed, own_sum(&rest));
+}
 
 /// What can be compared without fields: the last row, sums over the rows, the title.
 pub(crate) fn check_text(
@@ -168,20 +179,12 @@ pub(crate) fn check_series(
         // Whether it should be there is a question of names.
         return Ok(());
     };
-    let text = String::from_utf8_lossy(&content.bytes);
-    let attribute = |set: &str, name: &str| -> Option<String> {
-        let (_, rest) = set.split_once(&format!(" {name}=\""))?;
-        rest.split_once('"').map(|(value, _)| value.to_owned())
-    };
-    let listed: Vec<Option<(String, String)>> = text
-        .split("<DataSet")
-        .skip(1)
-        .map(|set| attribute(set, "timestep").zip(attribute(set, "file")))
-        .collect();
-    let expected = levels.iter().map(|l| Some((l.to_string(), level_file(*l))));
-    let whole = text.trim_end().ends_with("</VTKFile>");
-    let wrong = (!whole || !listed.into_iter().eq(expected))
-        .then(|| "it does not list the levels that have fields".to_owned());
+    let names: Vec<(usize, String)> = levels.iter().map(|&l| (l, level_file(l))).collect();
+    let mut expected = Vec::new();
+    // Writing to memory does not fail.
+    let written = write_series(&mut expected, names.iter().map(|(l, name)| (*l, name.as_str())));
+    let wrong = (written.is_err() || content.bytes != expected)
+        .then(|| "it is not the index of the levels that have fields".to_owned());
     report.property(SERIES, "levels", wrong);
     Ok(())
 }

@@ -17,6 +17,15 @@ pub(crate) enum Values {
     Integer(Vec<i64>),
 }
 
+impl Values {
+    fn len(&self) -> usize {
+        match self {
+            Values::Real(values) => values.len(),
+            Values::Integer(values) => values.len(),
+        }
+    }
+}
+
 /// An array with the element that it stands in.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Array {
@@ -234,6 +243,7 @@ impl<'a> Tag<'a> {
             ("type", Some(kind)),
             ("byte_order", Some("LittleEndian")),
             ("header_type", Some("UInt64")),
+            ("version", Some("1.0")),
             ("compressor", None),
         ] {
             let found = self.attribute(name);
@@ -272,6 +282,13 @@ impl<'a> Tag<'a> {
             }
         };
         let values = values.ok_or_else(|| format!("the array `{name}` ends inside a number"))?;
+        let components = if name == "Points" { 3 } else { 1 };
+        let tuples = values.len() / components;
+        for (key, expected) in [("NumberOfComponents", components), ("NumberOfTuples", tuples)] {
+            if self.attribute(key).is_some_and(|v| v.parse() != Ok(expected)) {
+                return Err(format!("`{key}` of the array `{name}` is wrong"));
+            }
+        }
         let bound = |key: &str| match self.attribute(key).map(str::parse) {
             None => Ok(None),
             Some(Ok(value)) => Ok(Some(value)),
@@ -317,7 +334,7 @@ impl Array {
 mod tests {
     use super::*;
 
-    const FILE: &str = "<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\" header_type=\"UInt64\"><PolyData><FieldData>\
+    const FILE: &str = "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"><PolyData><FieldData>\
         <DataArray type=\"Int64\" Name=\"level\" format=\"binary\">CAAAAAAAAAABAAAAAAAAAA==</DataArray></FieldData>\
         <Piece NumberOfPoints=\"7\"><CellData/><Points></Points></Piece></PolyData></VTKFile>\n";
 

@@ -95,8 +95,8 @@ impl Copy {
         rows.iter().map(|r| f64::from_le_bytes(*r)).collect()
     }
 
-    /// The bytes of an array of flags.
-    pub fn flags(&self, name: &str, array: &str) -> Vec<u8> {
+    /// The bytes of an array.
+    pub fn bytes_of(&self, name: &str, array: &str) -> Vec<u8> {
         let text = fs::read_to_string(self.file(name)).expect("text");
         decode(&text[find(&text, array).data])[8..].to_vec()
     }
@@ -147,6 +147,10 @@ impl Copy {
                 *sum = checksum(&bytes).into();
             }
         }
+        let rest = summary.as_object_mut().expect("an object");
+        rest.shift_remove("checksum");
+        let sum = adapt::output::summary::own_sum(rest);
+        rest.insert("checksum".into(), sum.into());
         fs::write(self.file("summary.json"), format!("{summary:#}\n")).expect("written");
     }
 }

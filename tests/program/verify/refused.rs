@@ -48,7 +48,7 @@ fn found(name: &str, change: impl FnOnce(&Copy), expected: &[&str]) {
 
 /// An interior vertex of the last level with an open gap, and one in contact.
 fn vertices(copy: &Copy) -> (usize, usize) {
-    let (gap, contact) = (copy.read(LAST, "gap"), copy.flags(LAST, "contact"));
+    let (gap, contact) = (copy.read(LAST, "gap"), copy.bytes_of(LAST, "contact"));
     let force = copy.read(LAST, "action_force");
     let radius: Vec<f64> = copy
         .read(LAST, "Points")
@@ -157,8 +157,12 @@ fn local_indicators() {
     }
     let change = |c: &Copy| c.reals("edges_0002.vtp", "eta_e", |v| v[5] += 1e-8);
     found("edges", change, &["`edges_0002.vtp`: `eta_e` at edge 5"]);
-    for (array, value) in [("generation", 9), ("region", 1)] {
-        let change = |c: &Copy| c.integer::<4>(LAST, array, 7, value);
+    let generation = |c: &Copy| c.bytes_of(LAST, "generation")[4 * 7];
+    for (array, more) in [("generation", 1), ("generation", -1), ("region", 1)] {
+        let change = |c: &Copy| {
+            let old = if array == "region" { 0 } else { i64::from(generation(c)) };
+            c.integer::<4>(LAST, array, 7, (old + more) as u64);
+        };
         found(array, change, &[&format!("`{array}` at triangle 7")]);
     }
     // An array of the level before, whole.
@@ -305,6 +309,10 @@ fn changes_that_only_a_checksum_sees() {
     refused("a comment", &|c| c.replace("scene.toml", "# Two", "# Few"), &sum("scene.toml"));
     refused("a space", &|c| c.replace("series.pvd", "  <Coll", "<Coll"), &sum("series.pvd"));
     refused("a load", &|c| c.replace("scene.toml", "-10*g", "-11*g"), &sum("scene.toml"));
+    for key in ["seconds_output", "peak_memory_mb"] {
+        refused(key, &|c| c.summary(|s| s["totals"][key] = 0.5.into()), "`summary.json`: `checksum` is");
+    }
+    refused("a machine", &|c| c.summary(|s| s["machine"]["cores"] = 64.into()), "`summary.json`: `checksum` is");
     refused("a bit", &|c| c.reals(LAST, "sigma", |s| s[0] = s[0].next_up()), &sum(LAST));
     let remove = |c: &Copy, name: &str| fs::remove_file(c.file(name)).expect("removed");
     for name in ["level_0001.vtu", "edges_0000.vtp", "series.pvd", "history.csv", "scene.toml"] {
@@ -396,6 +404,6 @@ fn random_bytes() {
         seen[place] += 1;
     }
     println!("hold, fail, unreadable: {seen:?}");
-    // A digit of a time, of the machine, of a version, or a byte replaced by itself may pass.
-    assert!(seen[0] < 40 && seen[1] > 60 && seen[2] > 60, "{seen:?}");
+    // A byte replaced by itself passes, as does a space in the summary.
+    assert!(seen[0] < 10 && seen[1] > 60 && seen[2] > 60, "{seen:?}");
 }
