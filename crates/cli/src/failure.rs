@@ -1,8 +1,8 @@
 //! Messages on standard error, and exit codes.
 
+use ::verify::VerifyError;
 use adapt::output::OutputError;
 use scene::SceneError;
-use ::verify::VerifyError;
 
 /// A claim of a run does not hold.
 pub const CLAIM_FAILS: u8 = 1;

@@ -10,7 +10,11 @@ pub(crate) fn nodal_action(level: &Discrete<'_>) -> Vec<f64> {
     let count = level.vertices();
     let around = neighbours(level);
     let mut value: Vec<Option<f64>> = (0..count)
-        .map(|j| level.is_interior(j).then(|| level.force[j] / level.dual_area[j]))
+        .map(|j| {
+            level
+                .is_interior(j)
+                .then(|| level.force[j] / level.dual_area[j])
+        })
         .collect();
     let mean = |j: usize, value: &[Option<f64>], counts: &dyn Fn(usize) -> bool| {
         let known: Vec<f64> = around[j]
@@ -22,7 +26,11 @@ pub(crate) fn nodal_action(level: &Discrete<'_>) -> Vec<f64> {
     };
     let mut open: Vec<usize> = (0..count).filter(|&j| !level.is_interior(j)).collect();
     let first = |j: usize| {
-        if level.gap(j) > 0.0 { Some(0.0) } else { mean(j, &value, &|k| level.is_interior(k)) }
+        if level.gap(j) > 0.0 {
+            Some(0.0)
+        } else {
+            mean(j, &value, &|k| level.is_interior(k))
+        }
     };
     let mut found: Vec<(usize, Option<f64>)> = open.iter().map(|&j| (j, first(j))).collect();
     while found.iter().any(|(_, v)| v.is_some()) {
@@ -30,7 +38,10 @@ pub(crate) fn nodal_action(level: &Discrete<'_>) -> Vec<f64> {
             value[j] = v;
         }
         open.retain(|&j| value[j].is_none());
-        found = open.iter().map(|&j| (j, mean(j, &value, &|_| true))).collect();
+        found = open
+            .iter()
+            .map(|&j| (j, mean(j, &value, &|_| true)))
+            .collect();
     }
     value.into_iter().map(|v| v.unwrap_or(0.0)).collect()
 }

@@ -62,7 +62,9 @@ mod tests {
 
     #[test]
     fn what_is_not_base64_is_refused() {
-        for text in ["Z", "Zg", "Zg=", "Zg===", "====", "Z===", "Zm9\n", "Zh==", "Zm9=", "Z=g="] {
+        for text in [
+            "Z", "Zg", "Zg=", "Zg===", "====", "Z===", "Zm9\n", "Zh==", "Zm9=", "Z=g=",
+        ] {
             assert_eq!(decode(text.as_bytes()), None, "{text}");
         }
     }

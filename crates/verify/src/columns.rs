@@ -109,13 +109,21 @@ impl<'a> Recomputed<'a> {
 
     fn true_error(&self) -> Option<Number> {
         let errors = self.errors.as_ref()?;
-        Some(Number::new(errors.energy, self.norm.value, self.norm.exponent))
+        Some(Number::new(
+            errors.energy,
+            self.norm.value,
+            self.norm.exponent,
+        ))
     }
 
     fn h1_error(&self) -> Option<Number> {
         let errors = self.errors.as_ref()?;
         let [a, b] = [0, 1].map(|i| seminorm(self.discrete, &self.discrete.displacement[i]));
-        Some(Number::new(errors.h1_total, a + b, self.scale.displacement()))
+        Some(Number::new(
+            errors.h1_total,
+            a + b,
+            self.scale.displacement(),
+        ))
     }
 
     fn sigma_error(&self) -> Option<Number> {
@@ -129,11 +137,18 @@ impl<'a> Recomputed<'a> {
         let interior = (0..d.vertices()).filter(|&j| d.is_interior(j)).count();
         // Full contact has half the unknowns, if the scene allows the model.
         let full = interior > 0 && d.in_contact().count() == interior && self.settings.solve.reduce;
-        if full && shares_boundary(d) { vec![interior] } else { vec![2 * interior] }
+        if full && shares_boundary(d) {
+            vec![interior]
+        } else {
+            vec![2 * interior]
+        }
     }
 
     fn contact_area(&self) -> Number {
-        let area = sum(self.discrete.in_contact().map(|j| self.discrete.dual_area[j]));
+        let area = sum(self
+            .discrete
+            .in_contact()
+            .map(|j| self.discrete.dual_area[j]));
         Number::plain(area, self.scale.area())
     }
 
@@ -146,7 +161,10 @@ impl<'a> Recomputed<'a> {
     /// The smallest gap; it stands in the summary only.
     pub fn smallest_gap(&self) -> Number {
         let gaps = (0..self.discrete.vertices()).map(|j| self.discrete.gap(j));
-        Number::plain(gaps.fold(f64::INFINITY, f64::min), self.scale.displacement())
+        Number::plain(
+            gaps.fold(f64::INFINITY, f64::min),
+            self.scale.displacement(),
+        )
     }
 }
 
@@ -162,21 +180,53 @@ type Column = (&'static str, fn(&Recomputed<'_>) -> Entry);
 pub(crate) const COLUMNS: &[Column] = &[
     ("level", |r| Entry::Count(vec![r.level])),
     ("vertices", |r| Entry::Count(vec![r.discrete.vertices()])),
-    ("triangles", |r| Entry::Count(vec![r.discrete.elements.len()])),
+    ("triangles", |r| {
+        Entry::Count(vec![r.discrete.elements.len()])
+    }),
     ("unknowns", |r| Entry::Count(r.unknowns())),
-    ("contact_vertices", |r| Entry::Count(vec![r.discrete.in_contact().count()])),
+    ("contact_vertices", |r| {
+        Entry::Count(vec![r.discrete.in_contact().count()])
+    }),
     ("contact_area", |r| Entry::Number(r.contact_area())),
     ("energy", |r| Entry::Number(r.energy)),
     ("energy_norm", |r| Entry::Number(r.norm)),
-    ("eta_K", |r| r.paper.as_ref().map(|p| p.eta_k.root(r.scale.force())).into()),
-    ("eta_e_sum", |r| r.paper.as_ref().map(|p| p.eta_e.sum(r.scale.force())).into()),
-    ("residual", |r| r.residual.as_ref().map(|l| l.root(r.scale.energy_norm())).into()),
-    ("certified", |r| r.certificate.as_ref().map_or(Entry::Unknown, |c| Entry::Number(c.bound))),
-    ("oscillation", |r| Entry::Number(r.oscillation.root(r.scale.force()))),
+    ("eta_K", |r| {
+        r.paper
+            .as_ref()
+            .map(|p| p.eta_k.root(r.scale.force()))
+            .into()
+    }),
+    ("eta_e_sum", |r| {
+        r.paper
+            .as_ref()
+            .map(|p| p.eta_e.sum(r.scale.force()))
+            .into()
+    }),
+    ("residual", |r| {
+        r.residual
+            .as_ref()
+            .map(|l| l.root(r.scale.energy_norm()))
+            .into()
+    }),
+    ("certified", |r| {
+        r.certificate
+            .as_ref()
+            .map_or(Entry::Unknown, |c| Entry::Number(c.bound))
+    }),
+    ("oscillation", |r| {
+        Entry::Number(r.oscillation.root(r.scale.force()))
+    }),
     ("error_bound", |r| r.bound().into()),
-    ("relative_bound", |r| r.bound().and_then(|b| b.over(r.norm)).into()),
+    ("relative_bound", |r| {
+        r.bound().and_then(|b| b.over(r.norm)).into()
+    }),
     ("true_error", |r| r.true_error().into()),
-    ("effectivity", |r| r.bound().zip(r.true_error()).and_then(|(b, e)| b.over(e)).into()),
+    ("effectivity", |r| {
+        r.bound()
+            .zip(r.true_error())
+            .and_then(|(b, e)| b.over(e))
+            .into()
+    }),
     ("sigma_error", |r| r.sigma_error().into()),
     ("solver", |_| Entry::Covered),
     ("iterations", |_| Entry::Covered),
@@ -193,7 +243,11 @@ pub(crate) const COLUMNS: &[Column] = &[
             Estimator::Paper => "paper",
         })
     }),
-    ("eta_alg", |r| r.certificate.as_ref().map_or(Entry::Unknown, |c| Entry::Number(c.eta_alg))),
+    ("eta_alg", |r| {
+        r.certificate
+            .as_ref()
+            .map_or(Entry::Unknown, |c| Entry::Number(c.eta_alg))
+    }),
     ("bound_711", |_| Entry::Unknown),
     ("bound_711_repaired", |_| Entry::Unknown),
     ("h1_error", |r| r.h1_error().into()),

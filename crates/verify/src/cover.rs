@@ -7,7 +7,7 @@ use fem_core::{Circle, Mesh};
 use crate::element::{Element, elements};
 use crate::grid::Grid;
 use crate::number::sum;
-use crate::report::Report;
+use crate::report::{Report, show};
 
 /// Largest deviation of areas and lengths, relative to those of the domain.
 const COVER: f64 = 1e-12;
@@ -19,10 +19,20 @@ const SPACINGS: f64 = 64.0;
 ///
 /// Every triangle of a conforming mesh lies on the left of its edges; if all boundary edges lie on the boundary of the domain and run
 /// around it once (equal lengths, on a circle the angle 2 pi), every point of the domain is covered once.
-pub(crate) fn check(mesh: &Mesh, initial: &Mesh, generation: &[i64], file: &str, report: &mut Report) {
+pub(crate) fn check(
+    mesh: &Mesh,
+    initial: &Mesh,
+    generation: &[i64],
+    file: &str,
+    report: &mut Report,
+) {
     let cover = Cover::new(mesh, initial);
     let first = initial.vertex_count().min(mesh.vertex_count());
-    let moved = |j: usize| distance(mesh.points()[j], initial.points()[j]) > cover.slack;
+    let moved = |j: usize| {
+        let [p, q] = [mesh.points()[j], initial.points()[j]];
+        let shown = |[x, y]: [f64; 2]| format!("({}, {}), scaled", show(x), show(y));
+        (distance(p, q) > cover.slack).then(|| (shown(p), Some(shown(q))))
+    };
     report.everywhere(file, "vertices of the initial mesh", "vertex", first, moved);
     let fewer = mesh.vertex_count() < initial.vertex_count();
     let fewer = fewer.then(|| "there are fewer vertices than in the initial mesh".into());
@@ -69,7 +79,9 @@ impl<'a> Cover<'a> {
             self.mesh.boundary()[j] && (x.hypot(y) - circle.radius).abs() > self.slack
         };
         if let Some(j) = (0..points.len()).find(|&j| off(j)) {
-            return Some(format!("vertex {j} is on the boundary and not on the circle"));
+            return Some(format!(
+                "vertex {j} is on the boundary and not on the circle"
+            ));
         }
         let angles = boundary(self.mesh).map(|[p, q]| {
             let ([a, b], [c, d]) = (from_centre(p), from_centre(q));
@@ -95,7 +107,9 @@ impl<'a> Cover<'a> {
         for [p, q] in boundary(self.mesh) {
             let middle = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
             if let Some([x, y]) = [p, middle].into_iter().find(|&p| !on(p)) {
-                return Some(format!("the boundary point ({x:e}, {y:e}), scaled, is not on that of the domain"));
+                return Some(format!(
+                    "the boundary point ({x:e}, {y:e}), scaled, is not on that of the domain"
+                ));
             }
         }
         let length = |mesh: &Mesh| sum(boundary(mesh).map(|[p, q]| distance(p, q)));
@@ -104,7 +118,9 @@ impl<'a> Cover<'a> {
         // Every vertex may be off by the slack.
         let edges = boundary(self.mesh).count() as f64;
         if (found - expected).abs() > COVER * expected + edges * self.slack * COVER.sqrt() {
-            return Some(format!("its boundary is {found} long instead of {expected}, scaled"));
+            return Some(format!(
+                "its boundary is {found} long instead of {expected}, scaled"
+            ));
         }
         let (found, whole) = (area(self.mesh), area(self.initial));
         if (found - whole).abs() > COVER * whole + self.slack * expected {
@@ -150,13 +166,22 @@ impl<'a> Cover<'a> {
             .iter()
             .map(|e| root(self.inside(e.vertices.map(|j| self.mesh.points()[j]))))
             .collect();
-        let far = self.mesh.points().iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
+        let far = self
+            .mesh
+            .points()
+            .iter()
+            .flatten()
+            .fold(0.0f64, |m, x| m.max(x.abs()));
         report.everywhere(file, "region", "triangle", leaves.len(), |t| {
-            home[t].is_none_or(|r| self.mesh.region()[t] != self.initial.region()[r])
+            let root = home[t].map(|r| self.initial.region()[r]);
+            let found = self.mesh.region()[t];
+            (root != Some(found)).then(|| (found.to_string(), Some(text(root))))
         });
         // Areas halve but for the rounding of coordinates, and next to a circle.
         let off = |t: usize| {
-            let Some(r) = home[t] else { return true };
+            let Some(r) = home[t] else {
+                return Some((generation[t].to_string(), Some(text(None::<i64>))));
+            };
             let since = generation[t].saturating_sub(i64::from(self.initial.generation()[r]));
             let halvings = (roots[r].area / leaves[t].area).log2();
             let rounding = SPACINGS * f64::EPSILON * far * leaves[t].diameter / leaves[t].area;
@@ -165,7 +190,10 @@ impl<'a> Cover<'a> {
                 None => [-HALVED - rounding, HALVED + rounding],
             };
             let surplus = since as f64 - halvings;
-            since < 0 || !(low..=high).contains(&surplus)
+            (since < 0 || !(low..=high).contains(&surplus)).then(|| {
+                let expected = f64::from(self.initial.generation()[r]) + halvings;
+                (generation[t].to_string(), Some(show(expected)))
+            })
         };
         report.everywhere(file, "generation", "triangle", leaves.len(), off);
     }
@@ -182,6 +210,13 @@ impl<'a> Cover<'a> {
         let shrink = (near / d[0].hypot(d[1])).min(1.0);
         [center[0] + shrink * d[0], center[1] + shrink * d[1]]
     }
+}
+
+/// A number of the initial triangle, if there is one.
+fn text(number: Option<impl ToString>) -> String {
+    number.map_or("none, since it is outside the domain".into(), |n| {
+        n.to_string()
+    })
 }
 
 /// How far, in bisections, the area of a triangle may be from a power of two of its root's but for the rounding of coordinates.
@@ -209,4 +244,89 @@ fn to_segment(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
     let share = (from[0] * along[0] + from[1] * along[1]) / (along[0].powi(2) + along[1].powi(2));
     let share = share.clamp(0.0, 1.0);
     distance(p, [a[0] + share * along[0], a[1] + share * along[1]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::square;
+    use fem_core::{Children, TriangleId};
+
+    fn said(mesh: &Mesh, initial: &Mesh, generation: &[i64]) -> Vec<String> {
+        let mut report = Report::default();
+        check(mesh, initial, generation, "f", &mut report);
+        report.failures.iter().map(ToString::to_string).collect()
+    }
+
+    fn generations(mesh: &Mesh) -> Vec<i64> {
+        mesh.generation().iter().map(|&g| i64::from(g)).collect()
+    }
+
+    fn rebuilt(mesh: &Mesh, move_point: impl Fn([f64; 2]) -> [f64; 2], skip: usize) -> Mesh {
+        let triangles: Vec<[u32; 3]> = mesh
+            .triangles()
+            .iter()
+            .enumerate()
+            .filter(|(t, _)| *t != skip)
+            .map(|(_, v)| v.map(|v| v.0))
+            .collect();
+        let points = mesh.points().iter().map(|&p| move_point(p)).collect();
+        Mesh::with_refinement_edges(points, &triangles, &[], None).unwrap()
+    }
+
+    #[test]
+    fn refinements_cover_and_others_do_not() {
+        let initial = square(4);
+        let mut mesh = initial.clone();
+        for round in 0..6 {
+            mesh.refine(&[TriangleId(round)], Children::Four).unwrap();
+        }
+        let generation = generations(&mesh);
+        assert_eq!(said(&mesh, &initial, &generation), [""; 0]);
+        let whole = usize::MAX;
+        // A triangle in the middle is missing.
+        let hole = rebuilt(&mesh, |p| p, 20);
+        let said_of =
+            |mesh: &Mesh| said(mesh, &initial, &generation[..mesh.triangle_count()]).join("; ");
+        assert!(said_of(&hole).contains("is not on that of the domain"));
+        // The whole is larger by a part in 1e10, or turned.
+        let larger = rebuilt(&mesh, |p| p.map(|x| x * (1.0 + 1e-10)), whole);
+        assert!(said_of(&larger).contains("`cover of the domain`"));
+        let turned = rebuilt(&mesh, |[x, y]| [-y, x], whole);
+        assert!(said_of(&turned).contains("`vertices of the initial mesh`"));
+        // An inner vertex that is no midpoint any more, and a wrong generation.
+        let last = mesh.vertex_count() - 1;
+        let moved = mesh.points()[last];
+        let bent = rebuilt(
+            &mesh,
+            |p| if p == moved { [p[0] + 1e-9, p[1]] } else { p },
+            whole,
+        );
+        assert!(
+            said_of(&bent).contains("`generation`"),
+            "{}",
+            said_of(&bent)
+        );
+        let mut wrong = generation.clone();
+        wrong[3] += 1;
+        assert_eq!(
+            said(&mesh, &initial, &wrong),
+            [format!(
+                "`f`: `generation` at triangle 3 is `{}`, recomputed `{}`",
+                wrong[3], generation[3]
+            )]
+        );
+    }
+
+    #[test]
+    fn half_of_the_domain_is_not_all_of_it() {
+        let initial = square(2);
+        let points = vec![[-1.0, -1.0], [0.0, -1.0], [0.0, 0.0], [-1.0, 0.0]];
+        let part = Mesh::with_refinement_edges(points, &[[2, 0, 1], [0, 2, 3]], &[], None).unwrap();
+        let said = said(&part, &initial, &[0, 0]).join("; ");
+        assert!(
+            said.contains("fewer vertices") && said.contains("`cover of the domain`"),
+            "{said}"
+        );
+    }
 }

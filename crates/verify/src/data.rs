@@ -2,7 +2,8 @@
 
 use adapt::Problem;
 use fem_core::integrate::{Loads, loads, means};
-use fem_core::{Field, FieldError, Mesh, Samples};
+use fem_core::scale::times_power_of_two;
+use fem_core::{Field, FieldError, Mesh, Samples, Scale};
 
 use crate::element::{Element, elements};
 
@@ -10,6 +11,8 @@ use crate::element::{Element, elements};
 pub(crate) struct Discrete<'a> {
     /// The mesh of the file.
     pub mesh: &'a Mesh,
+    /// The units.
+    pub scale: Scale,
     /// Its triangles.
     pub elements: Vec<Element>,
     /// Element means of the tensions.
@@ -60,12 +63,16 @@ impl<'a> Discrete<'a> {
         };
         Ok(Discrete {
             tension: pair(&problem.tension)?,
-            loads: [loads(mesh, &*problem.load[0])?, loads(mesh, &*problem.load[1])?],
+            loads: [
+                loads(mesh, &*problem.load[0])?,
+                loads(mesh, &*problem.load[1])?,
+            ],
             heights: [
                 heights(mesh, &*problem.height[0])?,
                 heights(mesh, &*problem.height[1])?,
             ],
             mesh,
+            scale: problem.scale,
             elements,
             dual_area,
             displacement: nodal.displacement,
@@ -88,6 +95,14 @@ impl<'a> Discrete<'a> {
     /// w_j = u1_j - u2_j.
     pub fn gap(&self, j: usize) -> f64 {
         self.displacement[0][j] - self.displacement[1][j]
+    }
+
+    /// Values in the user's units.
+    pub fn physical(&self, values: &[f64], exponent: i32) -> Vec<f64> {
+        values
+            .iter()
+            .map(|&v| times_power_of_two(v, exponent))
+            .collect()
     }
 
     /// The vertices in contact.

@@ -106,9 +106,13 @@ pub(crate) fn check_earlier(
     level: Option<&Recomputed<'_>>,
     report: &mut Report,
 ) {
-    let holds = |&reason: &Reason| held(reason, settings, number, history, level) == Some(Held::Yes);
+    let holds =
+        |&reason: &Reason| held(reason, settings, number, history, level) == Some(Held::Yes);
     let wrong = RULES.into_iter().find(holds).map(|reason| {
-        format!("`{}` holds on level {number}, and the run went on", reason.key())
+        format!(
+            "`{}` holds on level {number}, and the run went on",
+            reason.key()
+        )
     });
     report.property(HISTORY, "stop", wrong);
 }
@@ -145,7 +149,11 @@ pub(crate) fn check_last(
         }
         _ => match RULES.into_iter().find(|r| r.key() == stopped_by) {
             None => {
-                report.property(SUMMARY, "stopped_by", Some(format!("`{stopped_by}` is no rule")));
+                report.property(
+                    SUMMARY,
+                    "stopped_by",
+                    Some(format!("`{stopped_by}` is no rule")),
+                );
                 return;
             }
             Some(reason) => {

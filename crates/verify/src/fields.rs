@@ -36,9 +36,25 @@ pub(crate) struct LevelFields {
 }
 
 /// Point arrays that every level has.
-const POINT: [&str; 7] = ["u1", "u2", "gap", "sigma", "action_force", "action", "contact"];
+const POINT: [&str; 7] = [
+    "u1",
+    "u2",
+    "gap",
+    "sigma",
+    "action_force",
+    "action",
+    "contact",
+];
 /// Cell arrays of doubles; which of them must be there depends on the scene.
-const CELL: [&str; 7] = ["eta_K", "eta_e", "residual", "certified", "oscillation", "f1_h", "f2_h"];
+const CELL: [&str; 7] = [
+    "eta_K",
+    "eta_e",
+    "residual",
+    "certified",
+    "oscillation",
+    "f1_h",
+    "f2_h",
+];
 /// Values of the whole file.
 const FIELD: [&str; 2] = ["level", "error_bound"];
 /// The rest of the cell arrays.
@@ -61,7 +77,10 @@ impl LevelFields {
         known(file, "Cells", &["connectivity", "offsets", "types"])?;
         known(file, "FieldData", &FIELD)?;
         let need = |name: &str| format!("the array `{name}` is missing");
-        let point = |name: &str| file.real("PointData", name, vertices)?.ok_or_else(|| need(name));
+        let point = |name: &str| {
+            file.real("PointData", name, vertices)?
+                .ok_or_else(|| need(name))
+        };
         let integer = |place: &str, name: &str, length: usize| {
             file.integer(place, name, length)?.ok_or_else(|| need(name))
         };
@@ -109,7 +128,10 @@ impl LevelFields {
             size > 0.0 && size < f64::MIN_POSITIVE / f64::EPSILON
         };
         let found = arrays.iter().find(|(_, values)| tiny(values))?;
-        Some(format!("the values of `{}` are too small for doubles to hold all digits", found.0))
+        Some(format!(
+            "the values of `{}` are too small for doubles to hold all digits",
+            found.0
+        ))
     }
 
     /// A cell array of doubles, if it is there.
@@ -200,10 +222,16 @@ fn vertex_numbers(numbers: &[i64]) -> Result<Vec<u32>, String> {
 fn known(file: &VtkFile, place: &str, names: &[&str]) -> Result<(), String> {
     for array in file.arrays() {
         if array.place == place && !names.contains(&array.name.as_str()) {
-            return Err(format!("the array `{}` is not known to this version", array.name));
+            return Err(format!(
+                "the array `{}` is not known to this version",
+                array.name
+            ));
         }
         if !array.range_holds() {
-            return Err(format!("the range beside the array `{}` is not that of its values", array.name));
+            return Err(format!(
+                "the range beside the array `{}` is not that of its values",
+                array.name
+            ));
         }
     }
     Ok(())

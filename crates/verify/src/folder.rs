@@ -5,10 +5,10 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use adapt::Settings;
 use adapt::output::checksum::checksum;
 use adapt::output::folder::{HISTORY, SCENE, SERIES, SUMMARY, edges_file, is_ours, level_file};
 use adapt::settings::{Estimator, Fields};
-use adapt::Settings;
 use serde_json::{Map, Value};
 
 use crate::error::VerifyError;
@@ -58,7 +58,9 @@ impl Folder {
             }
         }
         if !names.contains(SUMMARY) {
-            return Err(none("there is no `summary.json`, which a run writes at its end"));
+            return Err(none(
+                "there is no `summary.json`, which a run writes at its end",
+            ));
         }
         Ok(Folder {
             path: path.to_path_buf(),
@@ -77,7 +79,10 @@ impl Folder {
         let path = self.path(name);
         match fs::read(&path) {
             Ok(bytes) => {
-                let genuine = self.sums.get(name).is_some_and(|sum| *sum == checksum(&bytes));
+                let genuine = self
+                    .sums
+                    .get(name)
+                    .is_some_and(|sum| *sum == checksum(&bytes));
                 Ok(Some(Content { bytes, genuine }))
             }
             Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -116,7 +121,11 @@ impl Folder {
         }
         for (name, sum) in self.sums.clone() {
             // A name that no run writes is not looked for: it might lead out of the folder.
-            let content = if is_ours(&name) && name != SUMMARY { self.read(&name)? } else { None };
+            let content = if is_ours(&name) && name != SUMMARY {
+                self.read(&name)?
+            } else {
+                None
+            };
             match content {
                 Some(content) => {
                     let found = checksum(&content.bytes);
@@ -165,13 +174,21 @@ impl Folder {
         for name in self.names.difference(&expected) {
             // What a run that may be resumed leaves behind.
             if exit_code == 0 || !name.starts_with("checkpoint.") {
-                report.property(name, "file", Some("a run of this scene does not write it".into()));
+                report.property(
+                    name,
+                    "file",
+                    Some("a run of this scene does not write it".into()),
+                );
             }
         }
         for name in &expected {
             let stated = name == SUMMARY || self.sums.contains_key(name);
             if !stated && self.names.contains(name) {
-                report.property(name, "SHA-256", Some("the summary does not state it".into()));
+                report.property(
+                    name,
+                    "SHA-256",
+                    Some("the summary does not state it".into()),
+                );
             }
         }
         with_fields

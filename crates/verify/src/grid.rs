@@ -47,7 +47,9 @@ impl Grid {
     /// The items near a point.
     pub fn near(&self, p: [f64; 2]) -> impl Iterator<Item = usize> + '_ {
         let [i, j] = [0, 1].map(|k| self.place(p[k], k));
-        self.boxes[i * self.count[1] + j].iter().map(|&n| n as usize)
+        self.boxes[i * self.count[1] + j]
+            .iter()
+            .map(|&n| n as usize)
     }
 }
 

@@ -100,7 +100,12 @@ fn mesh(fields: &LevelFields, scene: &Scene) -> Result<Mesh, LevelError> {
     .map_err(|e| wrong(e.to_string()))?;
     // A mesh turns clockwise triangles; a run writes none.
     let same = |(read, kept): (&[u32; 3], &[fem_core::VertexId; 3])| *read == kept.map(|v| v.0);
-    match fields.triangles.iter().zip(mesh.triangles()).position(|t| !same(t)) {
+    match fields
+        .triangles
+        .iter()
+        .zip(mesh.triangles())
+        .position(|t| !same(t))
+    {
         Some(t) => Err(wrong(format!("triangle {t} is not counter-clockwise"))),
         None => Ok(mesh),
     }
@@ -137,15 +142,32 @@ impl LevelFile {
         if let Some(bound) = level.bound() {
             report.number(&name, "error_bound", fields.error_bound, bound);
         }
-        let flags = |j: usize| !matches!(fields.contact[j], 0 | 1);
-        report.everywhere(&name, "contact is 0 or 1", "vertex", fields.contact.len(), flags);
-        cover::check(&self.mesh, &scene.problem.mesh, &fields.generation, &name, report);
+        let flags = |j: usize| {
+            let flag = fields.contact[j];
+            (!matches!(flag, 0 | 1)).then(|| (flag.to_string(), None))
+        };
+        report.everywhere(
+            &name,
+            "contact is 0 or 1",
+            "vertex",
+            fields.contact.len(),
+            flags,
+        );
+        cover::check(
+            &self.mesh,
+            &scene.problem.mesh,
+            &fields.generation,
+            &name,
+            report,
+        );
         conditions::check(discrete, &name, report);
         sigma::check(discrete, &name, report);
 
         let count = discrete.vertices();
         let gap: Vec<f64> = (0..count).map(|j| discrete.gap(j)).collect();
-        let action: Vec<f64> = (0..count).map(|j| discrete.force[j] / discrete.dual_area[j]).collect();
+        let action: Vec<f64> = (0..count)
+            .map(|j| discrete.force[j] / discrete.dual_area[j])
+            .collect();
         let point = |claim: &'static str, claimed, recomputed, exponent| Claim {
             file: &name,
             name: claim,
@@ -158,7 +180,10 @@ impl LevelFile {
         let ends = |j: usize| discrete.displacement[0][j].abs() + discrete.displacement[1][j].abs();
         let claim = point("gap", &fields.gap, &gap, scale.displacement());
         report.values(&claim, |j| 2.0 * f64::EPSILON * ends(j));
-        report.array(&point("action", &fields.action, &action, scale.load), |_| 0.0);
+        report.array(
+            &point("action", &fields.action, &action, scale.load),
+            |_| 0.0,
+        );
 
         let paper = level.paper.as_ref();
         let energy = scale.energy_norm();
@@ -166,11 +191,34 @@ impl LevelFile {
         let loads = &discrete.loads;
         let none: &[f64] = &[];
         for (claim, local, exponent) in [
-            ("eta_K", paper.map(|p| (&p.eta_k.value[..], &p.eta_k.terms[..])), scale.force()),
-            ("eta_e", paper.map(|p| (&p.eta_e_cell.value[..], &p.eta_e_cell.terms[..])), scale.force()),
-            ("residual", level.residual.as_ref().map(|l| (&l.value[..], &l.terms[..])), energy),
-            ("certified", certificate.map(|c| (&c.local.value[..], &c.local.terms[..])), energy),
-            ("oscillation", Some((&level.oscillation.value[..], none)), scale.force()),
+            (
+                "eta_K",
+                paper.map(|p| (&p.eta_k.value[..], &p.eta_k.terms[..])),
+                scale.force(),
+            ),
+            (
+                "eta_e",
+                paper.map(|p| (&p.eta_e_cell.value[..], &p.eta_e_cell.terms[..])),
+                scale.force(),
+            ),
+            (
+                "residual",
+                level
+                    .residual
+                    .as_ref()
+                    .map(|l| (&l.value[..], &l.terms[..])),
+                energy,
+            ),
+            (
+                "certified",
+                certificate.map(|c| (&c.local.value[..], &c.local.terms[..])),
+                energy,
+            ),
+            (
+                "oscillation",
+                Some((&level.oscillation.value[..], none)),
+                scale.force(),
+            ),
             ("f1_h", Some((&loads[0].mean[..], none)), scale.load),
             ("f2_h", Some((&loads[1].mean[..], none)), scale.load),
         ] {
@@ -187,7 +235,9 @@ impl LevelFile {
                     report.array(&array, |t| ROUNDING * terms.get(t).copied().unwrap_or(0.0));
                 }
                 (None, None) => report.property(&name, claim, None),
-                (None, Some(_)) => report.property(&name, claim, Some("the array is missing".into())),
+                (None, Some(_)) => {
+                    report.property(&name, claim, Some("the array is missing".into()))
+                }
                 (Some(_), None) => {
                     let wrong = "the array was not asked for or is not recomputed by this version";
                     report.property(&name, claim, Some(wrong.into()));
@@ -230,9 +280,10 @@ impl LevelFile {
         report.property(&name, "points", points);
         let expected = edges(&self.mesh);
         let same = expected.len() == fields.edges.len()
-            && expected.iter().zip(&fields.edges).all(|(e, read)| {
-                e.ends.iter().zip(read).all(|(&end, &v)| end == v as usize)
-            });
+            && expected
+                .iter()
+                .zip(&fields.edges)
+                .all(|(e, read)| e.ends.iter().zip(read).all(|(&end, &v)| end == v as usize));
         let wrong = (!same).then(|| "they are not the interior edges of the level".to_owned());
         report.property(&name, "connectivity", wrong);
         if same {
@@ -272,7 +323,11 @@ pub(crate) fn reduction(level: &Recomputed<'_>) -> &'static str {
     let ratio = b[0] / a[0];
     if constant(a) && constant(b) {
         "constant-tensions"
-    } else if a.iter().zip(b).all(|(a, b)| ((b / a) / ratio - 1.0).abs() <= SAME) {
+    } else if a
+        .iter()
+        .zip(b)
+        .all(|(a, b)| ((b / a) / ratio - 1.0).abs() <= SAME)
+    {
         "constant-ratio"
     } else {
         "two-field"

@@ -37,6 +37,8 @@ mod report;
 mod sigma;
 mod summary;
 mod tables;
+#[cfg(test)]
+mod testing;
 mod vtk;
 
 use std::path::Path;
@@ -72,7 +74,10 @@ pub fn verify(path: &Path) -> Result<Report, VerifyError> {
         return Ok(report);
     };
     report.levels = history.len();
-    let code = summary.get("exit_code").and_then(Value::as_i64).unwrap_or(0);
+    let code = summary
+        .get("exit_code")
+        .and_then(Value::as_i64)
+        .unwrap_or(0);
     let with_fields = folder.check_names(&scene.settings, history.len(), code, &mut report);
     summary::check_text(&summary, &scene, &history, &mut report);
     summary::check_series(&folder, &with_fields, &mut report)?;
@@ -87,16 +92,24 @@ pub fn verify(path: &Path) -> Result<Report, VerifyError> {
             Some(file) => file.discrete(&scene).map(Some),
             None => Ok(None),
         };
-        let level = discrete.as_ref().map_err(Clone::clone).and_then(|discrete| match discrete {
-            Some(discrete) => {
-                Recomputed::new(discrete, number, &scene.problem, &scene.settings, last).map(Some)
-            }
-            None => Ok(None),
-        });
+        let level = discrete
+            .as_ref()
+            .map_err(Clone::clone)
+            .and_then(|discrete| match discrete {
+                Some(discrete) => {
+                    Recomputed::new(discrete, number, &scene.problem, &scene.settings, last)
+                        .map(Some)
+                }
+                None => Ok(None),
+            });
         let level = match level {
             Ok(level) => level,
             Err(why) => {
-                report.property(SCENE, &format!("data on level {number}"), Some(why.to_string()));
+                report.property(
+                    SCENE,
+                    &format!("data on level {number}"),
+                    Some(why.to_string()),
+                );
                 None
             }
         };
@@ -116,9 +129,21 @@ pub fn verify(path: &Path) -> Result<Report, VerifyError> {
         if last {
             let certificate = level.as_ref().and_then(|l| l.certificate.as_ref());
             certificate::check_summary(&summary, certificate, &mut report);
-            ending::check_last(&scene.settings, &summary, &history, level.as_ref(), &mut report);
+            ending::check_last(
+                &scene.settings,
+                &summary,
+                &history,
+                level.as_ref(),
+                &mut report,
+            );
         } else {
-            ending::check_earlier(&scene.settings, number, &history, level.as_ref(), &mut report);
+            ending::check_earlier(
+                &scene.settings,
+                number,
+                &history,
+                level.as_ref(),
+                &mut report,
+            );
         }
     }
     Ok(report)

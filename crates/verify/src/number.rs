@@ -46,7 +46,11 @@ impl Number {
         Some(Number {
             value,
             // 0/x: whatever the numerator may be over the divisor.
-            slack: if self.value == 0.0 { self.slack / divisor.value.abs() } else { slack },
+            slack: if self.value == 0.0 {
+                self.slack / divisor.value.abs()
+            } else {
+                slack
+            },
             exponent: self.exponent - divisor.exponent,
         })
     }
@@ -77,7 +81,11 @@ pub(crate) fn sum(values: impl IntoIterator<Item = f64>) -> f64 {
     let (mut sum, mut rest) = (0.0f64, 0.0f64);
     for v in values {
         let next = sum + v;
-        rest += if sum.abs() >= v.abs() { (sum - next) + v } else { (v - next) + sum };
+        rest += if sum.abs() >= v.abs() {
+            (sum - next) + v
+        } else {
+            (v - next) + sum
+        };
         sum = next;
     }
     sum + rest

@@ -97,7 +97,13 @@ impl Report {
     ) {
         self.claims += 1;
         if claimed != recomputed {
-            self.differ(file, claim, &claimed.to_string(), &recomputed.to_string(), None);
+            self.differ(
+                file,
+                claim,
+                &claimed.to_string(),
+                &recomputed.to_string(),
+                None,
+            );
         }
     }
 
@@ -177,24 +183,29 @@ impl Report {
         }
     }
 
-    /// A property of every value of an array, or of every place of a mesh: `wrong(k)` is true where it fails.
+    /// A property of every value of an array, or of every place of a mesh: `wrong(k)` is what the file has there where it fails, and
+    /// what it should have if that can be said.
     pub(crate) fn everywhere(
         &mut self,
         file: &str,
         claim: &str,
         place: &str,
         count: usize,
-        wrong: impl Fn(usize) -> bool,
+        wrong: impl Fn(usize) -> Option<(String, Option<String>)>,
     ) {
         self.claims += 1;
-        let mut failed = (0..count).filter(|&k| wrong(k));
-        if let Some(first) = failed.next() {
+        let mut failed = (0..count).filter_map(|k| Some((k, wrong(k)?)));
+        if let Some((first, (claimed, recomputed))) = failed.next() {
+            let claimed = match recomputed {
+                Some(_) => claimed,
+                None => format!("there it is `{claimed}`"),
+            };
             self.fail(Failure {
                 file: file.to_owned(),
                 claim: claim.to_owned(),
                 place: format!("{place} {first}"),
-                claimed: "does not hold".into(),
-                recomputed: None,
+                claimed,
+                recomputed,
                 difference: None,
                 others: failed.count(),
             });
@@ -221,7 +232,11 @@ pub(crate) struct Claim<'a> {
 /// A number so that every digit is seen.
 pub(crate) fn show(value: f64) -> String {
     let (plain, exponent) = (format!("{value}"), format!("{value:e}"));
-    if exponent.len() < plain.len() { exponent } else { plain }
+    if exponent.len() < plain.len() {
+        exponent
+    } else {
+        plain
+    }
 }
 
 #[cfg(test)]
@@ -258,8 +273,17 @@ mod tests {
     fn messages() {
         let mut report = Report::default();
         report.same("summary.json", "levels", 3, 4);
-        report.property("level_0001.vtu", "triangulation", Some("the mesh has no triangles".into()));
-        report.everywhere("level_0001.vtu", "u1 >= u2", "vertex", 9, |k| k > 6);
+        report.property(
+            "level_0001.vtu",
+            "triangulation",
+            Some("the mesh has no triangles".into()),
+        );
+        report.everywhere("level_0001.vtu", "gap >= 0", "vertex", 9, |k| {
+            (k > 6).then(|| ("-1".into(), None))
+        });
+        report.everywhere("level_0001.vtu", "region", "triangle", 2, |_| {
+            Some(("1".into(), Some("2".into())))
+        });
         report.number("summary.json", "energy", 2.5, Number::plain(2.0, 0));
         let said: Vec<String> = report.failures.iter().map(Failure::to_string).collect();
         assert_eq!(
@@ -267,7 +291,8 @@ mod tests {
             [
                 "`summary.json`: `levels` is `3`, recomputed `4`",
                 "`level_0001.vtu`: `triangulation`: the mesh has no triangles",
-                "`level_0001.vtu`: `u1 >= u2` at vertex 7: does not hold, and 1 other value",
+                "`level_0001.vtu`: `gap >= 0` at vertex 7: there it is `-1`, and 1 other value",
+                "`level_0001.vtu`: `region` at triangle 0 is `1`, recomputed `2`, and 1 other value",
                 "`summary.json`: `energy` is `2.5`, recomputed `2`, difference `5e-1`",
             ]
         );

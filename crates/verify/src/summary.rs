@@ -1,8 +1,8 @@
 //! The claims of `summary.json` beyond those of a level, of the rows of `history.csv`, and of `series.pvd`.
 
+use adapt::output::folder::{HISTORY, SERIES, SUMMARY, level_file};
 use adapt::output::pvd::write_series;
 use adapt::output::summary::{OWN_SUM, own_sum};
-use adapt::output::folder::{HISTORY, SERIES, SUMMARY, level_file};
 use scene::Scene;
 use serde_json::{Map, Value};
 
@@ -50,7 +50,12 @@ pub(crate) fn check_text(
     report: &mut Report,
 ) {
     let cell = |key: &str| Cell::of_json(summary.get(key));
-    report.same(SUMMARY, "levels", cell("levels").shown(), history.len().to_string());
+    report.same(
+        SUMMARY,
+        "levels",
+        cell("levels").shown(),
+        history.len().to_string(),
+    );
     let title = scene.title.clone().unwrap_or_else(|| "empty".into());
     report.same(SUMMARY, "title", cell("title").shown(), title);
     let last = history.len().saturating_sub(1);
@@ -69,31 +74,52 @@ pub(crate) fn check_text(
         .find(|key| !known(key) && !COLUMNS.iter().any(|(name, _)| name == key));
     let unknown = unknown.map(|key| format!("`{key}` is not known to this version"));
     report.property(SUMMARY, "keys", unknown);
-    let missing = KEYS.iter().copied().chain(COLUMNS.iter().map(|(name, _)| *name));
+    let missing = KEYS
+        .iter()
+        .copied()
+        .chain(COLUMNS.iter().map(|(name, _)| *name));
     let missing = missing.into_iter().find(|key| !summary.contains_key(*key));
-    report.property(SUMMARY, "keys", missing.map(|key| format!("`{key}` is missing")));
+    report.property(
+        SUMMARY,
+        "keys",
+        missing.map(|key| format!("`{key}` is missing")),
+    );
     totals(summary, history, report);
     let lost = summary.get("not_representable").and_then(Value::as_array);
     let given = |name: &&Value| {
-        let Some(name) = name.as_str() else { return true };
-        let value = name.split('.').try_fold(None::<&Value>, |at, key| match at {
-            None => summary.get(key).map(Some),
-            Some(inside) => inside.get(key).map(Some),
-        });
+        let Some(name) = name.as_str() else {
+            return true;
+        };
+        let value = name
+            .split('.')
+            .try_fold(None::<&Value>, |at, key| match at {
+                None => summary.get(key).map(Some),
+                Some(inside) => inside.get(key).map(Some),
+            });
         !matches!(value, Some(Some(Value::Null)))
     };
     let wrong = match lost {
         None => Some("it is no list".to_owned()),
-        Some(list) => list.iter().find(given).map(|name| format!("{name} is no name of a null")),
+        Some(list) => list
+            .iter()
+            .find(given)
+            .map(|name| format!("{name} is no name of a null")),
     };
     report.property(SUMMARY, "not_representable", wrong);
 }
 
 /// The seconds of the stages are sums over the rows; the run took at least until its last level.
 fn totals(summary: &Map<String, Value>, history: &History, report: &mut Report) {
-    let total = |key: &str| summary.get("totals").and_then(|t| t.get(key)).and_then(Value::as_f64);
+    let total = |key: &str| {
+        summary
+            .get("totals")
+            .and_then(|t| t.get(key))
+            .and_then(Value::as_f64)
+    };
     for stage in ["refine", "assemble", "solve", "estimate"].map(|s| format!("seconds_{s}")) {
-        let rows: Option<Vec<f64>> = (0..history.len()).map(|l| history.number(l, &stage)).collect();
+        let rows: Option<Vec<f64>> = (0..history.len())
+            .map(|l| history.number(l, &stage))
+            .collect();
         let claim = format!("totals.{stage}");
         match (total(&stage), rows) {
             (Some(claimed), Some(rows)) => {
@@ -128,15 +154,28 @@ pub(crate) fn check_numbers(
     let gap = Entry::Number(level.smallest_gap());
     let entries = COLUMNS.iter().map(|(name, entry)| (*name, entry(level)));
     for (name, entry) in entries.chain([("smallest_gap", gap)]) {
-        compare(report, SUMMARY, name, &Cell::of_json(summary.get(name)), &entry);
+        compare(
+            report,
+            SUMMARY,
+            name,
+            &Cell::of_json(summary.get(name)),
+            &entry,
+        );
         let infinite = matches!(&entry, Entry::Number(n) if !n.physical().is_finite());
         if infinite != lost.contains(&name) {
-            let wrong = format!("`{name}` is listed though it is a number, or is not and should be");
+            let wrong =
+                format!("`{name}` is listed though it is a number, or is not and should be");
             report.property(SUMMARY, "not_representable", Some(wrong));
         }
     }
     let entry = Entry::Name(reduction(level));
-    compare(report, SUMMARY, "reduction", &Cell::of_json(summary.get("reduction")), &entry);
+    compare(
+        report,
+        SUMMARY,
+        "reduction",
+        &Cell::of_json(summary.get("reduction")),
+        &entry,
+    );
 }
 
 /// Level numbers of the rows, the counts of the first level, and vertices that become no fewer.
@@ -182,7 +221,10 @@ pub(crate) fn check_series(
     let names: Vec<(usize, String)> = levels.iter().map(|&l| (l, level_file(l))).collect();
     let mut expected = Vec::new();
     // Writing to memory does not fail.
-    let written = write_series(&mut expected, names.iter().map(|(l, name)| (*l, name.as_str())));
+    let written = write_series(
+        &mut expected,
+        names.iter().map(|(l, name)| (*l, name.as_str())),
+    );
     let wrong = (written.is_err() || content.bytes != expected)
         .then(|| "it is not the index of the levels that have fields".to_owned());
     report.property(SERIES, "levels", wrong);

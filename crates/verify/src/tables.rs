@@ -71,13 +71,19 @@ impl History {
         let mut lines = text.lines();
         let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
         if !names.iter().copied().eq(COLUMNS.iter().map(|c| c.name)) {
-            return Err("its first line does not hold the names of the columns of this version".into());
+            return Err(
+                "its first line does not hold the names of the columns of this version".into(),
+            );
         }
         let mut rows = Vec::new();
         for (k, line) in lines.enumerate() {
             let row: Vec<Cell> = line.split(',').map(Cell::of_text).collect();
             if row.len() != COLUMNS.len() {
-                return Err(format!("row {k} has {} cells instead of {}", row.len(), COLUMNS.len()));
+                return Err(format!(
+                    "row {k} has {} cells instead of {}",
+                    row.len(),
+                    COLUMNS.len()
+                ));
             }
             rows.push(row);
         }
@@ -146,7 +152,11 @@ pub(crate) fn compare(report: &mut Report, file: &str, name: &str, cell: &Cell, 
             let found = cell.number();
             let fits = counts.iter().any(|&n| found == Some(n as f64));
             let list: Vec<String> = counts.iter().map(usize::to_string).collect();
-            let recomputed = if fits { shown.clone() } else { list.join("` or `") };
+            let recomputed = if fits {
+                shown.clone()
+            } else {
+                list.join("` or `")
+            };
             report.same(file, name, shown, recomputed);
         }
         (Entry::Name(expected), _) => report.same(file, name, shown, (*expected).to_owned()),

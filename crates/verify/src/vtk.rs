@@ -92,7 +92,11 @@ impl VtkFile {
                 }
                 ("DataArray", [.., place]) if open.len() > 2 => {
                     let length = rest.find('<').ok_or("it ends inside an array")?;
-                    let data = if tag.kind == Kind::Empty { "" } else { &rest[..length] };
+                    let data = if tag.kind == Kind::Empty {
+                        ""
+                    } else {
+                        &rest[..length]
+                    };
                     file.arrays.push(tag.array(place, data)?);
                     if tag.kind == Kind::Open {
                         rest = &rest[length..];
@@ -112,7 +116,11 @@ impl VtkFile {
             return Err(format!("it has {pieces} pieces instead of one"));
         }
         let mut seen = std::collections::HashSet::new();
-        match file.arrays.iter().find(|a| !seen.insert((&a.place, &a.name))) {
+        match file
+            .arrays
+            .iter()
+            .find(|a| !seen.insert((&a.place, &a.name)))
+        {
             Some(twice) => Err(format!("the array `{}` is there twice", twice.name)),
             None => Ok(file),
         }
@@ -142,12 +150,7 @@ impl VtkFile {
     ///
     /// # Errors
     /// That it has another type, another length or a value that is not finite.
-    pub fn real(
-        &self,
-        place: &str,
-        name: &str,
-        length: usize,
-    ) -> Result<Option<Vec<f64>>, String> {
+    pub fn real(&self, place: &str, name: &str, length: usize) -> Result<Option<Vec<f64>>, String> {
         match self.find(place, name).map(|a| &a.values) {
             None => Ok(None),
             Some(Values::Integer(_)) => Err(format!("the array `{name}` does not hold Float64")),
@@ -213,7 +216,9 @@ impl<'a> Tag<'a> {
             (None, Some(rest)) => (Kind::Empty, rest),
             (None, None) => (Kind::Open, inside),
         };
-        let (name, mut rest) = inside.split_once(char::is_whitespace).unwrap_or((inside, ""));
+        let (name, mut rest) = inside
+            .split_once(char::is_whitespace)
+            .unwrap_or((inside, ""));
         let mut attributes = Vec::new();
         let broken = || format!("the tag `{name}` is malformed");
         loop {
@@ -271,11 +276,17 @@ impl<'a> Tag<'a> {
         let values = match self.attribute("type") {
             Some("Float64") => numbers(data, f64::from_le_bytes).map(Values::Real),
             Some("Int64") => numbers(data, i64::from_le_bytes).map(Values::Integer),
-            Some("Int32") => numbers(data, |b| i64::from(i32::from_le_bytes(b))).map(Values::Integer),
-            Some("UInt8") => Some(Values::Integer(data.iter().map(|&b| i64::from(b)).collect())),
+            Some("Int32") => {
+                numbers(data, |b| i64::from(i32::from_le_bytes(b))).map(Values::Integer)
+            }
+            Some("UInt8") => Some(Values::Integer(
+                data.iter().map(|&b| i64::from(b)).collect(),
+            )),
             // Nothing that is counted comes near 2^63; what does is out of range wherever it is used.
-            Some("UInt64") => numbers(data, |b| i64::try_from(u64::from_le_bytes(b)).unwrap_or(i64::MAX))
-                .map(Values::Integer),
+            Some("UInt64") => numbers(data, |b| {
+                i64::try_from(u64::from_le_bytes(b)).unwrap_or(i64::MAX)
+            })
+            .map(Values::Integer),
             other => {
                 let other = other.unwrap_or("absent");
                 return Err(format!("the array `{name}` has the unknown type `{other}`"));
@@ -284,8 +295,14 @@ impl<'a> Tag<'a> {
         let values = values.ok_or_else(|| format!("the array `{name}` ends inside a number"))?;
         let components = if name == "Points" { 3 } else { 1 };
         let tuples = values.len() / components;
-        for (key, expected) in [("NumberOfComponents", components), ("NumberOfTuples", tuples)] {
-            if self.attribute(key).is_some_and(|v| v.parse() != Ok(expected)) {
+        for (key, expected) in [
+            ("NumberOfComponents", components),
+            ("NumberOfTuples", tuples),
+        ] {
+            if self
+                .attribute(key)
+                .is_some_and(|v| v.parse() != Ok(expected))
+            {
                 return Err(format!("`{key}` of the array `{name}` is wrong"));
             }
         }
@@ -307,7 +324,8 @@ impl<'a> Tag<'a> {
 /// The numbers in a row of bytes; `None` if the last one is not complete.
 fn numbers<const N: usize, T>(data: &[u8], read: impl Fn([u8; N]) -> T) -> Option<Vec<T>> {
     let (chunks, rest) = data.as_chunks::<N>();
-    rest.is_empty().then(|| chunks.iter().map(|&c| read(c)).collect())
+    rest.is_empty()
+        .then(|| chunks.iter().map(|&c| read(c)).collect())
 }
 
 impl Array {
@@ -355,14 +373,18 @@ mod tests {
         let whole = VtkFile::parse(FILE.as_bytes(), "PolyData").unwrap();
         let end = FILE.trim_end().len();
         for cut in 0..end {
-            assert!(VtkFile::parse(&FILE.as_bytes()[..cut], "PolyData").is_err(), "{cut}");
+            assert!(
+                VtkFile::parse(&FILE.as_bytes()[..cut], "PolyData").is_err(),
+                "{cut}"
+            );
         }
         let mut accepted = 0;
         for at in 0..end {
             for byte in [0, b'<', b'>', b'"', b'9', b'=', b'/', 255] {
                 let mut bytes = FILE.as_bytes().to_vec();
                 bytes[at] = byte;
-                accepted += usize::from(VtkFile::parse(&bytes, "PolyData").is_ok_and(|f| f == whole));
+                accepted +=
+                    usize::from(VtkFile::parse(&bytes, "PolyData").is_ok_and(|f| f == whole));
             }
         }
         // Bytes that are replaced by themselves, and little else.

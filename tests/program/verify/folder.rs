@@ -76,7 +76,9 @@ impl Copy {
             let (rows, _) = bytes.as_chunks_mut::<8>();
             let mut values: Vec<f64> = rows.iter().map(|r| f64::from_le_bytes(*r)).collect();
             change(&mut values);
-            rows.iter_mut().zip(values).for_each(|(r, v)| *r = v.to_le_bytes());
+            rows.iter_mut()
+                .zip(values)
+                .for_each(|(r, v)| *r = v.to_le_bytes());
         });
     }
 

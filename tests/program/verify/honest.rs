@@ -10,7 +10,10 @@ fn holds(name: &str, run: &Run) -> verify::Report {
     let report = verify::verify(&run.out).unwrap_or_else(|e| panic!("{name}: {e}"));
     let said: Vec<String> = report.failures.iter().map(ToString::to_string).collect();
     assert!(report.holds(), "{name}: {said:#?}");
-    println!("{name}: {} claims, levels {:?} of {}", report.claims, report.recomputed, report.levels);
+    println!(
+        "{name}: {} claims, levels {:?} of {}",
+        report.claims, report.recomputed, report.levels
+    );
     report
 }
 
@@ -29,7 +32,11 @@ fn every_scene_of_the_repository_with_all_fields() {
         "tension-jump",
         "two-diaphragms",
     ] {
-        let keys = ["output.fields=\"all\"", "output.edges=true", "stop.levels=4"];
+        let keys = [
+            "output.fields=\"all\"",
+            "output.edges=true",
+            "stop.levels=4",
+        ];
         let run = run(&config(name), &set(&keys));
         assert_eq!(run.code, 5, "{name}: {}", run.stderr);
         assert_eq!(holds(name, &run).recomputed, [0, 1, 2, 3], "{name}");
@@ -42,16 +49,60 @@ fn every_way_to_run_a_scene() {
         ("square", &["stop.relative_error=0.25"][..], 1),
         ("square", &["output.fields=\"none\"", "stop.levels=3"], 0),
         ("square", &["output.fields=2", "stop.levels=4"], 3),
-        ("square", &["estimate.estimator=\"paper\"", "stop.relative_error=1.0"], 1),
-        ("square", &["estimate.estimator=\"paper\"", "estimate.also=[]", "output.edges=true", "stop.levels=2"], 1),
+        (
+            "square",
+            &["estimate.estimator=\"paper\"", "stop.relative_error=1.0"],
+            1,
+        ),
+        (
+            "square",
+            &[
+                "estimate.estimator=\"paper\"",
+                "estimate.also=[]",
+                "output.edges=true",
+                "stop.levels=2",
+            ],
+            1,
+        ),
         ("square", &["estimate.also=[]", "stop.levels=2"], 1),
         ("square", &["stop.error=3.0"], 1),
         ("square", &["stop.seconds=1e-9"], 1),
-        ("square", &["solve.solver=\"clarabel\"", "output.fields=\"all\"", "stop.levels=3"], 3),
+        (
+            "square",
+            &[
+                "solve.solver=\"clarabel\"",
+                "output.fields=\"all\"",
+                "stop.levels=3",
+            ],
+            3,
+        ),
         ("square", &["solve.reduction=\"off\"", "stop.levels=3"], 1),
-        ("full-contact", &["solve.reduction=\"off\"", "stop.levels=3"], 1),
-        ("disk", &["mark.strategy=\"uniform\"", "domain.disk.size=2", "output.fields=\"all\"", "stop.levels=4"], 4),
-        ("disk", &["mark.strategy=\"maximum\"", "mark.children=2", "domain.disk.size=2", "output.fields=\"all\"", "stop.levels=9"], 9),
+        (
+            "full-contact",
+            &["solve.reduction=\"off\"", "stop.levels=3"],
+            1,
+        ),
+        (
+            "disk",
+            &[
+                "mark.strategy=\"uniform\"",
+                "domain.disk.size=2",
+                "output.fields=\"all\"",
+                "stop.levels=4",
+            ],
+            4,
+        ),
+        (
+            "disk",
+            &[
+                "mark.strategy=\"maximum\"",
+                "mark.children=2",
+                "domain.disk.size=2",
+                "output.fields=\"all\"",
+                "stop.levels=9",
+            ],
+            9,
+        ),
     ] {
         let run = run(&config(name), &set(keys));
         let label = format!("{name} {keys:?}");
@@ -84,7 +135,10 @@ fn whatever_the_units_are() {
         );
         let run = scene(folder.path(), &text);
         assert_eq!(run.code, 0, "{length}: {}", run.stderr);
-        assert!(run.summary()["contact_vertices"].as_u64() > Some(0), "{length}");
+        assert!(
+            run.summary()["contact_vertices"].as_u64() > Some(0),
+            "{length}"
+        );
         assert_eq!(holds(length, &run).recomputed.len(), 4);
     }
 }
@@ -136,17 +190,30 @@ fn the_line_the_object_and_the_code() {
     let output = membranes(&["verify", out]);
     let line = String::from_utf8(output.stdout).expect("text");
     assert_eq!(output.status.code(), Some(0));
-    assert!(line.starts_with("verified: ") && line.lines().count() == 1, "{line}");
-    assert!(line.contains("fields of 1 of 2 levels recomputed"), "{line}");
+    assert!(
+        line.starts_with("verified: ") && line.lines().count() == 1,
+        "{line}"
+    );
+    assert!(
+        line.contains("fields of 1 of 2 levels recomputed"),
+        "{line}"
+    );
     assert!(output.stderr.is_empty());
     let output = membranes(&["verify", out, "--json"]);
-    let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    let object: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("one JSON object");
     assert_eq!(object["verified"], true);
     assert_eq!(object["recomputed"], serde_json::json!([1]));
     // A run keeps the rest of its summary beside the checksums.
-    let sums = run.summary()["checksums"].as_object().expect("checksums").clone();
+    let sums = run.summary()["checksums"]
+        .as_object()
+        .expect("checksums")
+        .clone();
     let names: Vec<&str> = sums.keys().map(String::as_str).collect();
-    assert_eq!(names, ["history.csv", "level_0001.vtu", "scene.toml", "series.pvd"]);
+    assert_eq!(
+        names,
+        ["history.csv", "level_0001.vtu", "scene.toml", "series.pvd"]
+    );
     assert_eq!(run.summary()["machine"]["os"], std::env::consts::OS);
 }
 
@@ -157,12 +224,19 @@ fn folders_that_hold_no_run() {
     for (folder, code, word) in [
         (path, 2, "summary.json"),
         ("no-such-folder", 2, "does not exist"),
-        (concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"), 2, "not a folder"),
+        (
+            concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"),
+            2,
+            "not a folder",
+        ),
     ] {
         let output = membranes(&["verify", folder]);
         let said = String::from_utf8(output.stderr).expect("text");
         assert_eq!(output.status.code(), Some(code), "{said}");
-        assert!(said.contains(word) && said.matches("error:").count() == 1, "{said}");
+        assert!(
+            said.contains(word) && said.matches("error:").count() == 1,
+            "{said}"
+        );
     }
     fs::write(folder.path().join("summary.json"), "{").expect("written");
     assert_eq!(membranes(&["verify", path]).status.code(), Some(4));
