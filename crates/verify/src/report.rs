@@ -229,13 +229,14 @@ pub(crate) struct Claim<'a> {
     pub exponent: i32,
 }
 
-/// A number so that every digit is seen.
+/// A number so that every digit is seen; counts as counts.
 pub(crate) fn show(value: f64) -> String {
     let (plain, exponent) = (format!("{value}"), format!("{value:e}"));
-    if exponent.len() < plain.len() {
-        exponent
-    } else {
+    let short = value.fract() == 0.0 && value.abs() < 1e9;
+    if short || plain.len() <= exponent.len() {
         plain
+    } else {
+        exponent
     }
 }
 
