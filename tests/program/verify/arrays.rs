@@ -1,7 +1,8 @@
 //! Changed fields and meshes, with checksums that fit: refused, and for the right reason.
 
 use super::folder::Copy;
-use super::{LAST, found, vertices};
+use super::{LAST, found, random, said, vertices};
+use crate::run::{config, run};
 
 #[test]
 fn nodal_values() {
@@ -199,4 +200,72 @@ fn meshes() {
         )
     };
     found("a range", change, &["the range beside the array `eta_K`"]);
+}
+
+#[test]
+fn any_value_of_any_array() {
+    // Two fields, variable tensions, a hole; adaptive, so that generations differ.
+    let keys = ["stop.levels=3", "output.edges=true"];
+    let arguments: Vec<&str> = keys.iter().flat_map(|key| ["--set", key]).collect();
+    let run = run(&config("two-diaphragms"), &arguments);
+    let honest = Copy::of(&run.out);
+    assert_eq!(said(&honest), [""; 0]);
+    let mut random = random();
+    let refused = |what: String, change: &dyn Fn(&Copy)| {
+        let copy = Copy::of(&run.out);
+        change(&copy);
+        copy.fit();
+        let said = said(&copy);
+        assert!(
+            !said.is_empty() && !said[0].contains("SHA-256"),
+            "{what}: {said:#?}"
+        );
+    };
+    for array in [
+        "u1",
+        "u2",
+        "gap",
+        "sigma",
+        "action_force",
+        "action",
+        "eta_K",
+        "eta_e",
+        "residual",
+        "oscillation",
+        "f1_h",
+        "f2_h",
+        "Points",
+    ] {
+        let values = honest.read(LAST, array);
+        let largest = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        // Constant loads have no oscillation at all.
+        let step = if largest > 0.0 { 2e-9 * largest } else { 1e-300 };
+        for _ in 0..6 {
+            let k = random(values.len());
+            let change = |c: &Copy| c.reals(LAST, array, |v| v[k] += step);
+            refused(format!("{array} {k}"), &change);
+        }
+    }
+    let count = honest.read(LAST, "u1").len();
+    let contact = honest.bytes_of(LAST, "contact");
+    let triangles = honest.read(LAST, "f1_h").len();
+    let generation = honest.bytes_of(LAST, "generation");
+    for _ in 0..6 {
+        let j = random(count);
+        let other = u64::from(1 - contact[j]);
+        refused(format!("contact {j}"), &|c| {
+            c.integer::<1>(LAST, "contact", j, other)
+        });
+        let t = random(triangles);
+        for other in [generation[4 * t] + 1, generation[4 * t] - 1] {
+            let change = |c: &Copy| c.integer::<4>(LAST, "generation", t, u64::from(other));
+            refused(format!("generation {t}"), &change);
+        }
+        let (at, other) = (random(3 * triangles), random(count) as u64);
+        let before = honest.bytes_of(LAST, "connectivity");
+        if before[8 * at..8 * at + 8] != other.to_le_bytes() {
+            let change = |c: &Copy| c.integer::<8>(LAST, "connectivity", at, other);
+            refused(format!("connectivity {at}"), &change);
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use std::fs;
 
 use super::folder::Copy;
-use super::{LAST, disk, found, honest, said};
+use super::{LAST, disk, found, honest, random, said};
 use crate::run::membranes;
 
 #[test]
@@ -278,13 +278,7 @@ fn codes_and_messages_of_the_program() {
 /// No byte of a run can make the program stumble.
 #[test]
 fn random_bytes() {
-    let mut state = 20_260_727u64;
-    let mut random = |below: usize| {
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        ((state >> 33) as usize) % below
-    };
+    let mut random = random();
     let run = disk("stop.levels=1");
     let names = [
         "level_0000.vtu",

@@ -118,6 +118,36 @@ fn scene(folder: &Path, text: &str) -> Run {
 }
 
 #[test]
+fn every_case_with_a_known_solution() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/cases");
+    let mut names: Vec<_> = fs::read_dir(cases)
+        .expect("the cases")
+        .map(|e| e.expect("an entry").path())
+        .collect();
+    names.sort();
+    assert_eq!(names.len(), 14);
+    for (k, case) in names.iter().enumerate() {
+        let name = case.file_stem().and_then(|n| n.to_str()).expect("a name");
+        let domain = match name {
+            "P1" => "[domain.disk]\nradius = 1\n",
+            "P3" => {
+                "[domain.polygon]\nouter = [[-1, -1], [0, -1], [0, 0], [1, 0], [1, 1], [-1, 1]]\n"
+            }
+            _ => "[domain.rectangle]\nlower = [-1, -1]\nupper = [1, 1]\nsize = 0.25\n",
+        };
+        let solver = ["active-set", "clarabel"][k % 2];
+        let data = fs::read_to_string(case).expect("a case");
+        let text = format!(
+            "{domain}{data}\n[solve]\nsolver = \"{solver}\"\n[stop]\nvertices = 500\n[output]\nfields = \"all\"\n"
+        );
+        let run = scene(folder.path(), &text);
+        assert_eq!(run.code, 0, "{name}: {}", run.stderr);
+        holds(name, &run);
+    }
+}
+
+#[test]
 fn whatever_the_units_are() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (length, tension, load) in [

@@ -27,6 +27,17 @@ pub fn disk(stop: &str) -> Run {
     run(&config("disk"), &arguments)
 }
 
+/// Numbers below a bound, always the same.
+pub fn random() -> impl FnMut(usize) -> usize {
+    let mut state = 20_260_727u64;
+    move |below: usize| {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        ((state >> 33) as usize) % below
+    }
+}
+
 /// The fields of the last level.
 pub const LAST: &str = "level_0002.vtu";
 
