@@ -199,9 +199,7 @@ mod tests {
         assert!(run.force && !run.quiet && !run.json);
         assert!(matches!(parsed("membranes check a.toml --json"), Ok(Task::Check(c)) if c.json));
         let verify = parsed("membranes verify runs/a --json");
-        assert!(
-            matches!(verify, Ok(Task::Verify(v)) if v.json && v.folder == PathBuf::from("runs/a"))
-        );
+        assert!(matches!(verify, Ok(Task::Verify(v)) if v.json && v.folder.ends_with("runs/a")));
     }
 
     #[test]

@@ -2,18 +2,18 @@
 //!
 //! [`verify`] reads `scene.toml`, `summary.json`, `history.csv`, the `.vtu` and `.vtp` files and `series.pvd` of a folder and recomputes every
 //! number that follows from the mesh, the nodal fields and the scene. It shares the mesh, the quadrature of data and the scene reader with the run, and
-//! nothing with its solvers: residuals are summed element by element without a matrix ([`conditions`]), sigma is proved by its residual
-//! ([`sigma`]), estimators are written anew ([`indicators`]), VTK files are read by a reader of its own ([`vtk`]). Only the true
+//! nothing with its solvers: residuals are summed element by element without a matrix (`conditions`), sigma is proved by its residual
+//! (`sigma`), estimators are written anew (`indicators`), VTK files are read by a reader of its own (`vtk`). Only the true
 //! errors are those of `estimate`.
 //!
 //! What cannot be recomputed (times, memory, iterations, levels without fields) is covered by the SHA-256 sums in `summary.json`.
 //!
-//! - [`folder`], [`tables`], [`vtk`], [`fields`]: files, cells and arrays;
-//! - [`cover`]: whether the triangles cover the scene's domain as a refinement of its initial mesh;
-//! - [`data`], [`element`]: the scene's data on a mesh; [`conditions`], [`sigma`]: the discrete conditions;
-//! - [`indicators`], [`action`], [`certificate`]: what is estimated; [`columns`]: how each column follows;
-//! - [`ending`]: outcome, rule and exit code;
-//! - [`number`], [`report`]: comparison and result.
+//! - `folder`, `tables`, `vtk`, `fields`: files, cells and arrays;
+//! - `cover`: whether the triangles cover the scene's domain as a refinement of its initial mesh;
+//! - `data`, `element`: the scene's data on a mesh; `conditions`, `sigma`: the discrete conditions;
+//! - `indicators`, `action`, `certificate`: what is estimated; `columns`: how each column follows;
+//! - `ending`: outcome, rule and exit code;
+//! - `number`, `report`: comparison and result.
 //!
 //! Nothing in here prints.
 

@@ -239,7 +239,11 @@ fn any_value_of_any_array() {
         let values = honest.read(LAST, array);
         let largest = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         // Constant loads have no oscillation at all.
-        let step = if largest > 0.0 { 2e-9 * largest } else { 1e-300 };
+        let step = if largest > 0.0 {
+            2e-9 * largest
+        } else {
+            1e-300
+        };
         for _ in 0..6 {
             let k = random(values.len());
             let change = |c: &Copy| c.reals(LAST, array, |v| v[k] += step);
