@@ -220,6 +220,7 @@ fn any_value_of_any_array() {
             !said.is_empty() && !said[0].contains("SHA-256"),
             "{what}: {said:#?}"
         );
+        println!("{what}: {}", said[0]);
     };
     for array in [
         "u1",
