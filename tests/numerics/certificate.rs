@@ -49,7 +49,15 @@ fn of(
 fn errors(problem: &Problem, level: &Level, solution: &Solution) -> TrueErrors {
     let exact = problem.exact.as_ref().expect("known");
     let (mesh, discrete) = (&level.mesh, &level.discrete);
-    estimate::true_errors(mesh, discrete, solution, exact, &problem.tension).expect("finite")
+    estimate::true_errors(
+        mesh,
+        &discrete.tension_mean,
+        &solution.displacement,
+        &solution.sigma,
+        exact,
+        &problem.tension,
+    )
+    .expect("finite")
 }
 
 #[test]
@@ -395,9 +403,15 @@ fn certificate_marks_like_the_true_error() {
                     contact::solve(&discrete, &settings, start.as_ref()).expect("solved");
                 let exact = problem.exact.as_ref().expect("known");
                 let mesh = &problem.mesh;
-                let errors =
-                    estimate::true_errors(mesh, &discrete, &solution, exact, &problem.tension)
-                        .expect("finite");
+                let errors = estimate::true_errors(
+                    mesh,
+                    &discrete.tension_mean,
+                    &solution.displacement,
+                    &solution.sigma,
+                    exact,
+                    &problem.tension,
+                )
+                .expect("finite");
                 points.push((mesh.vertex_count() as f64, errors.energy));
                 if mesh.vertex_count() > 10_000 {
                     return points;

@@ -3,4 +3,5 @@
 mod command_line;
 mod configs;
 mod run;
+mod verify;
 mod vtk;

@@ -66,15 +66,16 @@ impl Estimates {
         let errors = match &problem.exact {
             Some(exact) => Some(estimate::true_errors(
                 mesh,
-                discrete,
-                solution,
+                &discrete.tension_mean,
+                &solution.displacement,
+                &solution.sigma,
                 exact,
                 &problem.tension,
             )?),
             None => None,
         };
         let contact_set = match problem.exact.as_ref().and_then(|e| e.contact.as_deref()) {
-            Some(exact) => Some(estimate::contact_set(mesh, discrete, solution, exact)?),
+            Some(exact) => Some(estimate::contact_set(mesh, &solution.contact, exact)?),
             None => None,
         };
         let certificate = match moments {

@@ -59,6 +59,12 @@ impl Recorder {
     /// # Errors
     /// What could not be written.
     pub fn finish(&mut self, ending: Finish) -> Result<Value, OutputError> {
+        let mut additions = ending.additions;
+        let sums = self.folder.checksums().iter();
+        let sums: Map<String, Value> = sums
+            .map(|(name, sum)| (name.clone(), sum.as_str().into()))
+            .collect();
+        additions.insert("checksums".into(), sums.into());
         let summary = Summary {
             ending: ending.ending,
             stopped_by: ending.stopped_by,
@@ -69,7 +75,7 @@ impl Recorder {
             wall_seconds: self.begun.elapsed().as_secs_f64(),
             seconds_output: self.seconds,
             peak_memory_mb: peak_memory_mb(),
-            additions: ending.additions,
+            additions,
         };
         self.folder.write_summary(&summary)?;
         Ok(summary.to_json())

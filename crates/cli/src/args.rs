@@ -15,6 +15,8 @@ pub enum Task {
     Run(RunArgs),
     /// `membranes check`.
     Check(CheckArgs),
+    /// `membranes verify`.
+    Verify(VerifyArgs),
     /// Something that later versions do.
     Later(String),
 }
@@ -33,10 +35,11 @@ enum Command {
     Run(RunArgs),
     /// Read a scene, build its initial mesh, say what will be modelled, and write nothing
     Check(CheckArgs),
+    /// Recompute every claim of a finished run from its files alone
+    #[command(after_help = EXIT_CODES_OF_VERIFY)]
+    Verify(VerifyArgs),
     #[command(hide = true, disable_help_flag = true)]
     Study(Rest),
-    #[command(hide = true, disable_help_flag = true)]
-    Verify(Rest),
     #[command(hide = true, disable_help_flag = true)]
     Plot(Rest),
     #[command(hide = true, disable_help_flag = true)]
@@ -100,6 +103,22 @@ pub struct CheckArgs {
     pub json: bool,
 }
 
+/// Arguments of `membranes verify`.
+#[derive(Args, Clone, Debug, PartialEq)]
+pub struct VerifyArgs {
+    /// The folder of a finished run
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Print a JSON object instead of the final line
+    #[arg(long)]
+    pub json: bool,
+    #[arg(long, hide = true, value_name = "N")]
+    threads: Option<String>,
+}
+
+/// What `membranes verify --help` ends with.
+const EXIT_CODES_OF_VERIFY: &str = "Exit codes: 0 every claim holds, 1 a claim fails, 2 DIR is no finished run, 4 a file cannot be read";
+
 #[derive(Args, Debug)]
 struct Rest {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
@@ -125,8 +144,9 @@ fn understand(arguments: impl IntoIterator<Item = OsString>) -> Result<Task, cla
         Command::Run(run) if run.resume => Ok(Task::Later("--resume".into())),
         Command::Run(run) => Ok(Task::Run(run)),
         Command::Check(check) => Ok(Task::Check(check)),
+        Command::Verify(verify) if verify.threads.is_some() => Ok(Task::Later("--threads".into())),
+        Command::Verify(verify) => Ok(Task::Verify(verify)),
         Command::Study(_) => later("study"),
-        Command::Verify(_) => later("verify"),
         Command::Plot(_) => later("plot"),
         Command::Schema(_) => later("schema"),
         Command::New(_) => later("new"),
@@ -178,6 +198,8 @@ mod tests {
         assert_eq!(run.out, Some(PathBuf::from("d")));
         assert!(run.force && !run.quiet && !run.json);
         assert!(matches!(parsed("membranes check a.toml --json"), Ok(Task::Check(c)) if c.json));
+        let verify = parsed("membranes verify runs/a --json");
+        assert!(matches!(verify, Ok(Task::Verify(v)) if v.json && v.folder.ends_with("runs/a")));
     }
 
     #[test]
@@ -187,7 +209,7 @@ mod tests {
             other => panic!("{other:?}"),
         };
         assert_eq!(later("membranes study a.toml --out d"), "membranes study");
-        assert_eq!(later("membranes verify"), "membranes verify");
+        assert_eq!(later("membranes verify d --threads 2"), "--threads");
         assert_eq!(later("membranes plot --help"), "membranes plot");
         assert_eq!(later("membranes run a.toml --threads 4"), "--threads");
         assert_eq!(later("membranes run a.toml --resume"), "--resume");
@@ -199,6 +221,8 @@ mod tests {
             "membranes",
             "membranes rnu a.toml",
             "membranes run",
+            "membranes verify",
+            "membranes verify a b",
             "membranes run a --nope",
         ] {
             assert_eq!(parsed(text), Err(2), "{text}");

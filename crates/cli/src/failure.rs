@@ -1,8 +1,11 @@
 //! Messages on standard error, and exit codes.
 
+use ::verify::VerifyError;
 use adapt::output::OutputError;
 use scene::SceneError;
 
+/// A claim of a run does not hold.
+pub const CLAIM_FAILS: u8 = 1;
 /// The scene, the mesh or the command line is wrong; nothing was written.
 pub const WRONG_INPUT: u8 = 2;
 /// A numerical failure; the last good level is kept.
@@ -35,7 +38,7 @@ impl Failure {
 
     /// The refusal of what later versions do.
     pub fn not_in_this_version(what: &str) -> Self {
-        let hint = "the commands of this version are `membranes run` and `membranes check`";
+        let hint = "the commands of this version are `membranes run`, `membranes check` and `membranes verify`";
         let hint = (!what.starts_with('-')).then_some(hint);
         Failure::new(
             WRONG_INPUT,
@@ -77,6 +80,18 @@ impl From<OutputError> for Failure {
             ),
             _ => Failure::new(FILES, error, None),
         }
+    }
+}
+
+impl From<VerifyError> for Failure {
+    fn from(error: VerifyError) -> Self {
+        let (code, hint) = if error.is_user_error() {
+            let hint = "give the folder that `membranes run` wrote: its `--out`, else `runs/NAME`";
+            (WRONG_INPUT, Some(hint))
+        } else {
+            (FILES, None)
+        };
+        Failure::new(code, error, hint)
     }
 }
 

@@ -7,6 +7,7 @@ mod names;
 mod number;
 mod progress;
 mod run;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -22,6 +23,7 @@ fn main() -> ExitCode {
     let done = std::panic::catch_unwind(|| match &task {
         Task::Run(run) => run::run(run),
         Task::Check(check) => check::check(check),
+        Task::Verify(folder) => verify::verify(folder),
         Task::Later(what) => Err(Failure::not_in_this_version(what)),
     });
     match done {

@@ -24,7 +24,7 @@ mod cut;
 mod distance;
 mod nearest;
 
-use contact::{DiscreteProblem, Solution};
+use fem_core::assemble::dual_areas;
 use fem_core::{Field, FieldError, Mesh, TriangleId};
 
 use cut::{CENTRE, Part, cell, divide, point};
@@ -62,19 +62,18 @@ impl ContactSet {
     }
 }
 
-/// Compares the contact set of a solution with `exact`, which is not zero inside the exact one.
+/// Compares a contact set, one flag a vertex, with `exact`, which is not zero inside the exact one.
 ///
 /// # Errors
 /// A value of `exact` that is not finite.
 pub fn contact_set(
     mesh: &Mesh,
-    problem: &DiscreteProblem,
-    solution: &Solution,
+    contact: &[bool],
     exact: &dyn Field,
 ) -> Result<ContactSet, FieldError> {
     let mut sets = Sets {
         mesh,
-        contact: &solution.contact,
+        contact,
         exact_area: 0.0,
         common_area: 0.0,
         whole: vec![false; mesh.triangle_count()],
@@ -83,10 +82,11 @@ pub fn contact_set(
         surplus: Vec::new(),
     };
     divide(mesh, exact, &mut |part| sets.add(&part))?;
-    let contact = (0..mesh.vertex_count()).filter(|&j| solution.contact[j]);
-    let area = contact
-        .map(|j| problem.dual_area[j])
-        .fold(0.0, |a, b| a + b);
+    let area = dual_areas(mesh)
+        .iter()
+        .zip(contact)
+        .filter(|(_, touches)| **touches)
+        .fold(0.0, |sum, (area, _)| sum + area);
     Ok(ContactSet {
         area,
         exact_area: sets.exact_area,

@@ -1,10 +1,12 @@
 //! The folder of a run: what may be replaced in it, and when.
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::atomic::{TEMPORARY, write_bytes, write_whole};
+use super::checksum::Summed;
 use super::error::OutputError;
 use super::history::write_history;
 use super::pvd::write_series;
@@ -14,13 +16,13 @@ use super::vtu::{LevelFields, write_level};
 use crate::record::LevelRecord;
 
 /// The scene as it was run.
-const SCENE: &str = "scene.toml";
+pub const SCENE: &str = "scene.toml";
 /// The run in one object.
-const SUMMARY: &str = "summary.json";
+pub const SUMMARY: &str = "summary.json";
 /// One row a level.
-const HISTORY: &str = "history.csv";
+pub const HISTORY: &str = "history.csv";
 /// ParaView's index.
-const SERIES: &str = "series.pvd";
+pub const SERIES: &str = "series.pvd";
 
 /// The file of a level's fields.
 pub fn level_file(level: usize) -> String {
@@ -40,6 +42,8 @@ pub struct RunFolder {
     begun: bool,
     /// Levels that have a file, ascending.
     levels: Vec<usize>,
+    /// SHA-256 of every file written but the summary, by name.
+    checksums: BTreeMap<String, String>,
 }
 
 impl RunFolder {
@@ -57,6 +61,7 @@ impl RunFolder {
             force,
             begun: false,
             levels: Vec::new(),
+            checksums: BTreeMap::new(),
         };
         folder.check()?;
         Ok(folder)
@@ -118,7 +123,7 @@ impl RunFolder {
     /// Those of [`RunFolder::begin`] and [`write_whole`].
     pub fn write_scene(&mut self, text: &str) -> Result<(), OutputError> {
         self.begin()?;
-        write_bytes(&self.path.join(SCENE), text.as_bytes())
+        self.write(SCENE, |writer| writer.write_all(text.as_bytes()))
     }
 
     /// Writes `history.csv` with every level so far; a finished level stays whatever happens later.
@@ -127,9 +132,7 @@ impl RunFolder {
     /// Those of [`RunFolder::begin`] and [`write_whole`].
     pub fn write_history(&mut self, levels: &[LevelRecord]) -> Result<(), OutputError> {
         self.begin()?;
-        write_whole(&self.path.join(HISTORY), |writer| {
-            write_history(writer, levels)
-        })
+        self.write(HISTORY, |writer| write_history(writer, levels))
     }
 
     /// Writes `level_NNNN.vtu`, then `series.pvd` with it.
@@ -139,14 +142,12 @@ impl RunFolder {
     pub fn write_level(&mut self, fields: LevelFields<'_>) -> Result<(), OutputError> {
         self.begin()?;
         let level = fields.level;
-        write_whole(&self.path.join(level_file(level)), |writer| {
-            write_level(writer, fields)
-        })?;
+        self.write(&level_file(level), |writer| write_level(writer, fields))?;
         if let Err(place) = self.levels.binary_search(&level) {
             self.levels.insert(place, level);
         }
         let files: Vec<(usize, String)> = self.levels.iter().map(|&l| (l, level_file(l))).collect();
-        write_whole(&self.path.join(SERIES), |writer| {
+        self.write(SERIES, |writer| {
             write_series(writer, files.iter().map(|(l, name)| (*l, name.as_str())))
         })
     }
@@ -157,9 +158,31 @@ impl RunFolder {
     /// Those of [`RunFolder::begin`], [`write_whole`] and [`write_edges`].
     pub fn write_edges(&mut self, fields: EdgeFields<'_>) -> Result<(), OutputError> {
         self.begin()?;
-        write_whole(&self.path.join(edges_file(fields.level)), |writer| {
+        self.write(&edges_file(fields.level), |writer| {
             write_edges(writer, fields)
         })
+    }
+
+    /// SHA-256, in hexadecimal digits, of the bytes of every file written so far but `summary.json`, by name.
+    pub fn checksums(&self) -> &BTreeMap<String, String> {
+        &self.checksums
+    }
+
+    /// Writes a file and keeps the checksum of its bytes.
+    fn write(
+        &mut self,
+        name: &str,
+        content: impl FnOnce(&mut Summed<'_>) -> io::Result<()>,
+    ) -> Result<(), OutputError> {
+        let mut sum = String::new();
+        write_whole(&self.path.join(name), |writer| {
+            let mut summed = Summed::new(writer);
+            content(&mut summed)?;
+            sum = summed.finish();
+            Ok(())
+        })?;
+        self.checksums.insert(name.to_owned(), sum);
+        Ok(())
     }
 
     /// Writes `summary.json`.
@@ -173,7 +196,7 @@ impl RunFolder {
 }
 
 /// Whether a run writes files of this name, a temporary file that a killed run left behind included.
-fn is_ours(name: &str) -> bool {
+pub fn is_ours(name: &str) -> bool {
     let numbered = |name: &str, head: &str, tail: &str| {
         name.strip_prefix(head)
             .and_then(|rest| rest.strip_suffix(tail))

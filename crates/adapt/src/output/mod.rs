@@ -5,9 +5,11 @@
 //! - [`folder`]: [`RunFolder`], what may be replaced in a folder and when; the one entry a run needs;
 //! - [`vtu`], [`vtp`], [`pvd`]: fields on the triangles, on the interior edges, and ParaView's index of the levels;
 //! - [`history`], [`summary`]: one row a level, and the run in one JSON object; [`columns`] names what both hold;
+//! - [`checksum`]: SHA-256 of what is written, for `membranes verify`;
 //! - [`memory`], [`machine`]: what the system says of memory and processor.
 
 pub mod atomic;
+pub mod checksum;
 pub mod columns;
 pub mod error;
 pub mod folder;

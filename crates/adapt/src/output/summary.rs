@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use super::checksum::checksum;
 use super::columns::{COLUMNS, Entry, reduction_name};
 use super::machine;
 use crate::record::LevelRecord;
@@ -58,7 +59,8 @@ pub struct Summary<'a> {
 
 impl Summary<'_> {
     /// The object, keys in a fixed order: how it ended; the columns of the last level under the names of the history;
-    /// `smallest_gap`; `certificate` with `bound`, `guaranteed` and `caveats`; `totals` over the levels; `versions`, `machine`; the additions; `not_representable`.
+    /// `smallest_gap`; `certificate` with `bound`, `guaranteed` and `caveats`; `totals` over the levels; `versions`, `machine`; the additions;
+    /// `not_representable`; `checksum`, which is [`own_sum`].
     ///
     /// What does not apply is null. JSON has no infinity: such a number is null too, and its name is listed under
     /// `not_representable` (nested names with a dot).
@@ -117,6 +119,8 @@ impl Summary<'_> {
         }
         let lost = std::mem::take(&mut object.lost);
         object.put("not_representable", lost);
+        let sum = own_sum(&object.map);
+        object.put(OWN_SUM, sum);
         Value::Object(object.map)
     }
 
@@ -124,6 +128,14 @@ impl Summary<'_> {
     pub fn to_text(&self) -> String {
         format!("{:#}\n", self.to_json())
     }
+}
+
+/// The key of [`own_sum`].
+pub const OWN_SUM: &str = "checksum";
+
+/// SHA-256 of everything else in the summary, written as JSON without spaces and line feeds, in the order of the file.
+pub fn own_sum(rest: &Map<String, Value>) -> String {
+    checksum(Value::Object(rest.clone()).to_string().as_bytes())
 }
 
 /// A JSON object under construction, and the numbers that it could not hold.

@@ -27,16 +27,12 @@ fn compare(
     discrete: impl Fn([f64; 2]) -> bool,
     exact: impl Fn(f64, f64) -> bool + Send + Sync,
 ) -> ContactSet {
-    let n = mesh.vertex_count();
-    let ones = vec![1.0; mesh.triangle_count()];
-    let problem = problem(mesh, [ones.clone(), ones], [0.0, 0.0]);
     let points = mesh.points().iter().zip(mesh.boundary());
-    let force = points
-        .map(|(p, boundary)| f64::from(!boundary && discrete(*p)))
+    let contact: Vec<bool> = points
+        .map(|(p, boundary)| !boundary && discrete(*p))
         .collect();
-    let solution = solution([vec![0.0; n], vec![0.0; n]], force, vec![0.0; n]);
     let field = move |x: f64, y: f64| f64::from(exact(x, y));
-    contact_set(mesh, &problem, &solution, &field).unwrap()
+    contact_set(mesh, &contact, &field).unwrap()
 }
 
 fn none(_: [f64; 2]) -> bool {
@@ -125,14 +121,12 @@ fn areas_and_distances_are_exact_to_a_small_part_of_the_element() {
 fn fields_are_looked_at_inside_elements_only() {
     // Infinite at a vertex, and a set that ends where an edge runs.
     let mesh = grid(8, 1.0);
-    let (n, ones) = (mesh.vertex_count(), vec![1.0; mesh.triangle_count()]);
-    let problem = problem(&mesh, [ones.clone(), ones], [0.0, 0.0]);
-    let solution = solution([vec![0.0; n], vec![0.0; n]], vec![0.0; n], vec![0.0; n]);
+    let none = vec![false; mesh.vertex_count()];
     let singular = |x: f64, y: f64| {
         let r = x.hypot(y);
         if x < 0.25 { r.ln().min(1.0 / r) } else { 0.0 }
     };
-    let found = contact_set(&mesh, &problem, &solution, &singular).unwrap();
+    let found = contact_set(&mesh, &none, &singular).unwrap();
     close(found.exact_area, 2.5, 1e-13);
 }
 
@@ -176,11 +170,8 @@ fn a_constant_field_is_the_whole_domain() {
     close(all.exact_area, 4.0, 1e-13);
     // The triangle in the corner (-1, 1) has no interior vertex; its barycentre is as near to the corner as the cells come.
     close(all.hausdorff.unwrap(), 8f64.sqrt() / 3.0 * 0.25, 1e-3);
-    let ones = vec![1.0; mesh.triangle_count()];
-    let problem = problem(&mesh, [ones.clone(), ones], [0.0, 0.0]);
-    let n = mesh.vertex_count();
-    let solution = solution([vec![0.0; n], vec![0.0; n]], vec![0.0; n], vec![0.0; n]);
-    let found = contact_set(&mesh, &problem, &solution, &Constant(-2.0)).unwrap();
+    let none = vec![false; mesh.vertex_count()];
+    let found = contact_set(&mesh, &none, &Constant(-2.0)).unwrap();
     close(found.exact_area, 4.0, 1e-13);
     assert_eq!(found.hausdorff, None);
 }
