@@ -55,7 +55,10 @@ impl Row {
     }
 }
 
-/// |sigma|_1^2 where sigma has no closed form.
+/// |sigma|_1^2 where sigma has no closed form: the sum of c_mn^2/k^2 over the sines of the square (-1, 1)^2 with k = pi/2 (m, n).
+///
+/// With the centre (x, y) and the radius r of the contact set, c_mn = sin(k_1 (x + 1)) sin(k_2 (y + 1)) times 5 (2 pi r/k) J_1(k r) for P8, and times
+/// 10 (4 pi r^2/k^2) J_2(k r) for P4a.
 fn sigma_seminorm_squared(name: &str) -> Option<f64> {
     match name {
         "P8" => Some(1.27232460287906),
