@@ -166,7 +166,14 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         values: Vectors<U>,
     ) -> Descent<'a, U> {
         let n = hierarchy.len();
-        let zeros = || vec![U::Value::default(); n];
+        let mut zeros = || match levels.spare.pop() {
+            Some(mut old) => {
+                old.fill(U::Value::default());
+                old
+            }
+            None => vec![U::Value::default(); n],
+        };
+        let [r, scratch, correction, direction, image] = [(); 5].map(|()| zeros());
         Descent {
             hierarchy,
             finest,
@@ -182,11 +189,11 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             } else {
                 vec![false; n]
             },
-            r: zeros(),
-            scratch: zeros(),
-            correction: zeros(),
-            direction: zeros(),
-            image: zeros(),
+            r,
+            scratch,
+            correction,
+            direction,
+            image,
             curvature: None,
             cold: false,
             monotone_cycles: 0,
@@ -277,6 +284,19 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             }
             losses.push(loss);
             report.judge(&losses, left);
+        }
+    }
+
+    /// Gives the vectors back to the levels.
+    pub fn release(mut self) {
+        for vector in [
+            &mut self.r,
+            &mut self.scratch,
+            &mut self.correction,
+            &mut self.direction,
+            &mut self.image,
+        ] {
+            self.levels.spare.push(std::mem::take(vector));
         }
     }
 
