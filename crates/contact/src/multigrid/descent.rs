@@ -155,7 +155,6 @@ struct Reading {
 
 impl<'a, U: Unknowns> Descent<'a, U> {
     /// An iterate with its load; `untruncated` says that the levels hold the plain matrices.
-    #[allow(clippy::too_many_arguments)]
     pub fn new(
         hierarchy: &'a Hierarchy,
         finest: &'a Finest<U>,
@@ -402,5 +401,5 @@ fn hopeless(history: &[f64]) -> bool {
     }
     let fall = (history[n - 11] / history[n - 1]).ln() / 10.0;
     let missing = history[n - 1].ln();
-    !(fall > 0.0) || n as f64 + missing / fall > 2.0 * LIMIT as f64
+    fall.is_nan() || fall <= 0.0 || n as f64 + missing / fall > 2.0 * LIMIT as f64
 }
