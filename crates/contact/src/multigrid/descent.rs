@@ -158,7 +158,6 @@ struct Reading {
 
 impl<'a, U: Unknowns> Descent<'a, U> {
     /// An iterate with its load; `untruncated` says that the levels hold the plain matrices.
-    #[allow(clippy::too_many_arguments)]
     pub fn new(
         hierarchy: &'a Hierarchy,
         finest: &'a Finest<U>,
@@ -169,7 +168,14 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         values: Vectors<U>,
     ) -> Descent<'a, U> {
         let n = hierarchy.len();
-        let zeros = || vec![U::Value::default(); n];
+        let mut zeros = || match levels.spare.pop() {
+            Some(mut old) => {
+                old.fill(U::Value::default());
+                old
+            }
+            None => vec![U::Value::default(); n],
+        };
+        let [r, scratch, correction, direction, image] = [(); 5].map(|()| zeros());
         Descent {
             hierarchy,
             finest,
@@ -185,11 +191,11 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             } else {
                 vec![false; n]
             },
-            r: zeros(),
-            scratch: zeros(),
-            correction: zeros(),
-            direction: zeros(),
-            image: zeros(),
+            r,
+            scratch,
+            correction,
+            direction,
+            image,
             curvature: None,
             cold: false,
             monotone_cycles: 0,
@@ -282,6 +288,19 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             }
             losses.push(loss);
             report.judge(&losses, left);
+        }
+    }
+
+    /// Gives the vectors back to the levels.
+    pub fn release(mut self) {
+        for vector in [
+            &mut self.r,
+            &mut self.scratch,
+            &mut self.correction,
+            &mut self.direction,
+            &mut self.image,
+        ] {
+            self.levels.spare.push(std::mem::take(vector));
         }
     }
 
@@ -387,5 +406,5 @@ fn hopeless(history: &[f64]) -> bool {
     }
     let fall = (history[n - 11] / history[n - 1]).ln() / 10.0;
     let missing = history[n - 1].ln();
-    !(fall > 0.0) || n as f64 + missing / fall > 2.0 * LIMIT as f64
+    fall.is_nan() || fall <= 0.0 || n as f64 + missing / fall > 2.0 * LIMIT as f64
 }

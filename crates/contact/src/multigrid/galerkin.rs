@@ -20,6 +20,8 @@ pub(crate) struct Levels<U: Unknowns> {
     pub old_step: Vec<U::Value>,
     /// Scratch of a cycle: residuals of the old rows on their level.
     pub old_residual: Vec<U::Value>,
+    /// Vectors of the last descent, for the next: fresh memory costs more than the arithmetic on it.
+    pub spare: Vec<Vec<U::Value>>,
     /// The initial mesh.
     pub initial: MacroSolver<U>,
 }
@@ -35,6 +37,7 @@ impl<U: Unknowns> Levels<U> {
             old_pivot: vec![U::Pivot::default(); rows],
             old_step: vec![U::Value::default(); rows],
             old_residual: vec![U::Value::default(); rows],
+            spare: Vec::new(),
             initial: MacroSolver::new(hierarchy),
         }
     }

@@ -49,6 +49,7 @@ const AGEING: f64 = 1.25;
 /// A field after its descent, in the order of the mesh.
 struct Solved<U: Unknowns> {
     x: Vec<U::Value>,
+    /// The residual, of an inequality.
     r: Vec<U::Value>,
     contact: Vec<bool>,
     report: Report,
@@ -316,19 +317,19 @@ impl Run<'_> {
         let back = |values: &[U::Value]| -> Vec<U::Value> {
             hierarchy.rank.iter().map(|&p| values[p as usize]).collect()
         };
-        Ok(Solved {
+        let contact = |&p: &u32| descent.contact[p as usize] && !hierarchy.fixed[p as usize];
+        let solved = Solved {
             x: back(&descent.x),
-            r: back(&descent.r),
-            contact: hierarchy
-                .rank
-                .iter()
-                .map(|&p| {
-                    let p = p as usize;
-                    descent.contact[p] && !hierarchy.fixed[p]
-                })
-                .collect(),
+            r: if system.is_some() {
+                back(&descent.r)
+            } else {
+                Vec::new()
+            },
+            contact: hierarchy.rank.iter().map(contact).collect(),
             report,
-        })
+        };
+        descent.release();
+        Ok(solved)
     }
 
     /// sigma and the record.
