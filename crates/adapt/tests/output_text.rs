@@ -52,8 +52,8 @@ fn a_row_holds_what_applies_and_nothing_else() {
     assert_eq!(lines.len(), 3);
     assert_eq!(
         lines[2],
-        "1,200,360,160,12,0.30000000000000004,-0.3333333333333333,1e-9,0.25,0.5,1e22,,0,0.125,0.01,2,1.5,3,\
-         active-set,5,1.5e-16,0.5,0.25,0.125,1,2,8.5,residual,,10,11,4,6,7,0.75,0.875,0.0625"
+        "1,200,360,160,12,0.30000000000000004,-0.3333333333333333,1e-9,0.25,0.5,1e22,1.25,0,0.125,0.01,2,1.5,3,\
+         active-set,5,1.5e-16,0.5,0.25,0.125,1,2,8.5,residual,0.03125,10,11,4,6,7,0.75,0.875,0.0625"
     );
     let bare = LevelRecord {
         eta_k: None,
@@ -64,6 +64,9 @@ fn a_row_holds_what_applies_and_nothing_else() {
         contact_jaccard: None,
         contact_hausdorff: None,
         residual: None,
+        certified: None,
+        eta_alg: None,
+        assurance: None,
         relative_bound: None,
         true_error: None,
         effectivity: None,
@@ -126,6 +129,10 @@ fn the_summary_repeats_the_last_row_under_the_same_names() {
     assert_eq!(object["reduction"], "two-field");
     assert_eq!(object["wall_seconds"], 4.5);
     assert_eq!(object["smallest_gap"], 0.0);
+    assert_eq!(
+        object["certificate"],
+        json!({ "bound": 1.25, "guaranteed": true, "caveats": ["one"] })
+    );
     assert_eq!(
         object["totals"],
         json!({

@@ -2,6 +2,7 @@
 
 #![allow(dead_code)]
 
+use adapt::Assurance;
 use adapt::output::{EdgeFields, LevelFields};
 use adapt::record::LevelRecord;
 use contact::Reduction;
@@ -111,6 +112,12 @@ pub fn record(level: usize) -> LevelRecord {
         bound_711: Some(10.0),
         bound_711_repaired: Some(11.0),
         residual: Some(1e22),
+        certified: Some(1.25),
+        eta_alg: Some(0.03125),
+        assurance: Some(Assurance {
+            guaranteed: true,
+            caveats: vec!["one".into()],
+        }),
         oscillation: 0.0,
         error_bound: 0.125,
         bound_kind: "residual",
