@@ -202,7 +202,7 @@ fn overrides() {
         "upper.load = sin(x, y)",
         "parameters.e=2",
         "domain.disk.radius=1",
-        "estimate.estimator=certified",
+        "output.compression=true",
         "output.fields=[1",
         "",
     ]

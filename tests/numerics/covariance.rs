@@ -153,6 +153,8 @@ fn same_record(what: &str, plain: &LevelRecord, other: &LevelRecord, by: Scale) 
             (r.eta_k, by.force()),
             (r.eta_e_sum, by.force()),
             (r.residual, by.energy_norm()),
+            (r.certified, by.energy_norm()),
+            (r.eta_alg, by.energy_norm()),
             (Some(r.oscillation), by.force()),
             (r.relative_bound, 0),
             (r.true_error, by.energy_norm()),

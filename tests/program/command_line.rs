@@ -9,7 +9,7 @@ use crate::run::{config, membranes, run};
 const HISTORY: &str = "level,vertices,triangles,unknowns,contact_vertices,contact_area,energy,energy_norm,eta_K,eta_e_sum,\
 residual,certified,oscillation,error_bound,relative_bound,true_error,effectivity,sigma_error,solver,iterations,kkt_residual,\
 seconds_refine,seconds_assemble,seconds_solve,seconds_estimate,seconds_total,peak_memory_mb,bound_kind,eta_alg,bound_711,\
-bound_711_repaired,h1_error,contact_force,max_action,contact_area_error,contact_jaccard,contact_hausdorff";
+bound_711_repaired,h1_error,contact_force,max_action,contact_area_error,contact_jaccard,contact_hausdorff,algebraic_error";
 
 #[test]
 fn a_run_leaves_the_files_of_the_contract_and_one_line() {

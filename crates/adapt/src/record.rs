@@ -45,6 +45,8 @@ pub struct LevelRecord {
     pub certified: Option<f64>,
     /// Its part for the algebraic error.
     pub eta_alg: Option<f64>,
+    /// Estimate of the algebraic energy error that an iterative solver left; none for a direct one.
+    pub algebraic_error: Option<f64>,
     /// What the certificate holds for.
     pub assurance: Option<Assurance>,
     /// Data oscillation.
@@ -207,6 +209,10 @@ impl LevelRecord {
             seconds_total: 0.0,
             peak_memory_mb: None,
             certified: certificate.map(|c| by(c.bound, scale.energy_norm())),
+            algebraic_error: solution
+                .info
+                .algebraic_error
+                .map(|e| by(e, scale.energy_norm())),
             eta_alg: certificate.map(|c| by(c.algebraic, scale.energy_norm())),
             assurance,
         })

@@ -17,7 +17,7 @@ const HEADING: &str = "level,vertices,triangles,unknowns,contact_vertices,contac
 energy_norm,eta_K,eta_e_sum,residual,certified,oscillation,error_bound,relative_bound,true_error,effectivity,\
 sigma_error,solver,iterations,kkt_residual,seconds_refine,seconds_assemble,seconds_solve,seconds_estimate,\
 seconds_total,peak_memory_mb,bound_kind,eta_alg,bound_711,bound_711_repaired,h1_error,contact_force,max_action,\
-contact_area_error,contact_jaccard,contact_hausdorff";
+contact_area_error,contact_jaccard,contact_hausdorff,algebraic_error";
 
 fn history(levels: &[LevelRecord]) -> String {
     let mut bytes = Vec::new();
@@ -53,7 +53,7 @@ fn a_row_holds_what_applies_and_nothing_else() {
     assert_eq!(
         lines[2],
         "1,200,360,160,12,0.30000000000000004,-0.3333333333333333,1e-9,0.25,0.5,1e22,1.25,0,0.125,0.01,2,1.5,3,\
-         active-set,5,1.5e-16,0.5,0.25,0.125,1,2,8.5,residual,0.03125,10,11,4,6,7,0.75,0.875,0.0625"
+         active-set,5,1.5e-16,0.5,0.25,0.125,1,2,8.5,residual,0.03125,10,11,4,6,7,0.75,0.875,0.0625,0.015625"
     );
     let bare = LevelRecord {
         eta_k: None,
@@ -66,6 +66,7 @@ fn a_row_holds_what_applies_and_nothing_else() {
         residual: None,
         certified: None,
         eta_alg: None,
+        algebraic_error: None,
         assurance: None,
         relative_bound: None,
         true_error: None,
@@ -81,7 +82,7 @@ fn a_row_holds_what_applies_and_nothing_else() {
     assert_eq!(
         text.lines().nth(1).unwrap(),
         "0,100,180,160,12,0.30000000000000004,,1e-9,,,,,0,0.125,,,,,active-set,5,1.5e-16,0.5,0.25,0.125,1,2,,\
-         residual,,,,,6,,,,"
+         residual,,,,,6,,,,,"
     );
     for line in text.lines() {
         assert_eq!(line.split(',').count(), COLUMNS.len());

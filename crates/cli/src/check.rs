@@ -2,7 +2,7 @@
 
 use adapt::output::OutputError;
 use adapt::output::columns::reduction_name;
-use adapt::settings::{Stop, Strategy};
+use adapt::settings::{Estimator, Final, Stop, Strategy};
 use adapt::{Level, LevelError, Observer, Reason};
 use contact::{Reduction, Tensions};
 use scene::Scene;
@@ -165,6 +165,12 @@ fn estimators(scene: &Scene) -> String {
     if !also.is_empty() {
         text.push_str(&format!(", also {}", also.join(", ")));
     }
+    if estimate.wants(Estimator::Certified) {
+        text.push_str(match estimate.last {
+            Final::Sharp => "; the last certificate sharp",
+            Final::Fast => "; the last certificate fast",
+        });
+    }
     if scene.overview.exact {
         text.push_str("; true errors");
     }
@@ -201,6 +207,7 @@ fn object(scene: &Scene, first: Option<&Level>) -> Value {
         })),
         "estimator": names::estimator(settings.estimate.estimator),
         "also": also,
+        "final": names::last(settings.estimate.last),
         "exact": overview.exact,
         "marking": {
             "strategy": names::strategy(settings.mark.strategy),

@@ -1,6 +1,6 @@
 //! Settings by the names that the scene file has for them.
 
-use adapt::settings::{Children, Estimator, Fields, Stop, Strategy};
+use adapt::settings::{Children, Estimator, Fields, Final, Stop, Strategy};
 use contact::{Solver, Tolerance};
 use serde_json::Value;
 
@@ -29,6 +29,14 @@ pub fn estimator(estimator: Estimator) -> &'static str {
         Estimator::Certified => "certified",
         Estimator::Residual => "residual",
         Estimator::Paper => "paper",
+    }
+}
+
+/// `estimate.final`.
+pub fn last(last: Final) -> &'static str {
+    match last {
+        Final::Sharp => "sharp",
+        Final::Fast => "fast",
     }
 }
 

@@ -8,7 +8,7 @@ use scene::Scene;
 use serde_json::{Map, Value};
 
 use crate::args::RunArgs;
-use crate::failure::{FILES, Failure, LIMIT, NUMERICAL, say};
+use crate::failure::{FILES, Failure, LIMIT, NUMERICAL, say, tell};
 use crate::number::{percent, short};
 use crate::progress::Progress;
 
@@ -63,6 +63,11 @@ pub fn run(arguments: &RunArgs) -> Result<u8, Failure> {
         title: scene.title.clone(),
         additions: Map::new(),
     })?;
+    if !arguments.quiet {
+        caveats(recorder.levels())
+            .iter()
+            .for_each(|note| tell(note));
+    }
     say(&if arguments.json {
         with_folder(summary, &out).to_string()
     } else {
@@ -99,6 +104,13 @@ fn failed(error: RunError, scene: &Scene) -> Failure {
             Failure::new(NUMERICAL, format!("level {}: {cause}", error.level), hint)
         }
     }
+}
+
+/// What the certificate of the last level does not hold for, a line each.
+fn caveats(levels: &[LevelRecord]) -> Vec<String> {
+    let assurance = levels.last().and_then(|last| last.assurance.as_ref());
+    let caveats = assurance.map_or(&[][..], |a| &a.caveats);
+    caveats.iter().map(|c| format!("note: {c}")).collect()
 }
 
 fn with_folder(summary: Value, out: &Path) -> Value {

@@ -152,7 +152,6 @@ mod tests {
         ];
         let triangles = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 5, 2]];
         let mesh = Mesh::new(points, &triangles, &[], None).unwrap();
-        let problem = problem(&mesh, [vec![1.0; 5], vec![1.0; 5]], [0.0, 0.0]);
         let mut values = vec![7.0, 7.0, 7.0, 7.0, 1.5, 7.0];
         let upper = vec![0.0, 0.5, 0.0, 0.0, 0.0, 0.0];
         let solution = solution([upper, vec![0.0; 6]], vec![0.0; 6], vec![0.0; 6]);

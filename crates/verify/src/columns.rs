@@ -286,6 +286,8 @@ pub(crate) const COLUMNS: &[Column] = &[
             .map(|d| Number::plain(d, r.scale.length))
             .into()
     }),
+    // An estimate from the way of the solver; eta_alg is what it can be no larger than.
+    ("algebraic_error", |_| Entry::Covered),
 ];
 
 #[cfg(test)]

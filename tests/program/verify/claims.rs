@@ -15,6 +15,12 @@ fn numbers_of_the_last_level_in_history_and_summary() {
         "eta_K",
         "eta_e_sum",
         "residual",
+        "certified",
+        "bound_711",
+        "bound_711_repaired",
+        "contact_area_error",
+        "contact_jaccard",
+        "contact_hausdorff",
         "oscillation",
         "error_bound",
         "relative_bound",
@@ -38,8 +44,10 @@ fn numbers_of_the_last_level_in_history_and_summary() {
         ("unknowns", "1000"),
         ("contact_vertices", "7"),
         ("kkt_residual", "1e-9"),
-        ("bound_kind", "rt1"),
+        ("bound_kind", "residual"),
+        ("bound_kind", "rt0"),
         ("certified", "0.1"),
+        ("eta_alg", "1e-9"),
         ("true_error", ""),
     ] {
         let change = |c: &Copy| {
@@ -116,11 +124,25 @@ fn what_the_summary_says_of_the_run() {
         (
             "certificate",
             serde_json::json!({ "guaranteed": true }),
-            "not recomputed by this version",
+            "`certificate.guaranteed`: it should be false",
         ),
+        ("certificate", serde_json::Value::Null, "it is missing"),
         ("remark", "honest".into(), "`remark` is not known"),
     ] {
         let change = |c: &Copy| c.summary(|s| s[key] = value);
+        found(key, change, &[words]);
+    }
+    for (key, value, words) in [
+        ("guaranteed", serde_json::json!(true), "it should be false"),
+        ("caveats", serde_json::json!([]), "away from the circle"),
+        ("bound", serde_json::json!(0.01), "`bound` is 1e-2"),
+        (
+            "proof",
+            serde_json::json!("obvious"),
+            "`proof` is not known",
+        ),
+    ] {
+        let change = |c: &Copy| c.summary(|s| s["certificate"][key] = value);
         found(key, change, &[words]);
     }
     let change = |c: &Copy| c.summary(|s| s["totals"]["seconds_solve"] = 5.0.into());

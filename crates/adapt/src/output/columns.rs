@@ -100,6 +100,7 @@ pub const COLUMNS: &[Column] = columns![level;
     "contact_area_error" => level.contact_area_error,
     "contact_jaccard" => level.contact_jaccard,
     "contact_hausdorff" => level.contact_hausdorff,
+    "algebraic_error" => level.algebraic_error,
 ];
 
 /// The name of a reduction in files and messages.

@@ -114,6 +114,7 @@ pub fn record(level: usize) -> LevelRecord {
         residual: Some(1e22),
         certified: Some(1.25),
         eta_alg: Some(0.03125),
+        algebraic_error: Some(0.015625),
         assurance: Some(Assurance {
             guaranteed: true,
             caveats: vec!["one".into()],

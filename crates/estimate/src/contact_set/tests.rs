@@ -4,7 +4,7 @@ use fem_core::Constant;
 use fem_core::scale::times_power_of_two;
 
 use super::*;
-use crate::testing::{close, four_triangles, problem, solution};
+use crate::testing::{close, four_triangles};
 
 /// n x n squares of (-1, 1)^2 with diagonals along (1, 1), all lengths times `unit`.
 fn grid(n: usize, unit: f64) -> Mesh {
