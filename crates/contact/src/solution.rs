@@ -69,6 +69,8 @@ pub struct Cycles {
     pub mean: usize,
     /// Steps for sigma.
     pub sigma: usize,
+    /// Factorisations of the matrix of the initial mesh, those for sigma included where it shares the matrix of the model.
+    pub factorisations: usize,
 }
 
 /// Nodal solution of a [`DiscreteProblem`], one entry a vertex, boundary included.

@@ -372,6 +372,9 @@ impl Run<'_> {
             monotone: inequality.monotone,
             mean: steps(model.mean),
             sigma: steps(sigma_report),
+            factorisations: sigma_report
+                .map_or(0, |r| r.factorisations)
+                .max(inequality.factorisations),
         };
         let n = self.level.interior.len();
         let info = SolveInfo {
