@@ -334,3 +334,34 @@ fn finite(what: &'static str, values: Vec<f64>) -> Result<Vec<f64>, SolveError> 
         None => Ok(values),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::{Data, square};
+
+    #[test]
+    fn displacements_that_cross_meet_at_their_mean() {
+        let data = Data {
+            tensions: [&|_, _| 1.0, &|_, _| 3.0],
+            loads: [&|_, _| -1.0, &|_, _| 0.0],
+            heights: [&|_, _| 0.5, &|_, _| 0.0],
+        };
+        let problem = data.on(&square(4));
+        let level = Level::new(&problem, &Settings::default());
+        let mut displacement = problem.heights.clone();
+        let inner: Vec<usize> = level.interior.iter().collect();
+        // Crossed by rounding, far crossed, and apart.
+        let next = f64::from_bits(1.0f64.to_bits() + 1);
+        for (&j, [u1, u2]) in inner.iter().zip([[1.0, next], [1.0, 5.0], [2.0, 1.0]]) {
+            displacement[0][j] = u1;
+            displacement[1][j] = u2;
+        }
+        level.uncross(&mut displacement);
+        let at = |k: usize| [displacement[0][inner[k]], displacement[1][inner[k]]];
+        assert!(at(0)[0] == at(0)[1] && (1.0..=next).contains(&at(0)[0]));
+        // A quarter of the stiffness belongs to the upper membrane.
+        assert_eq!(at(1), [4.0, 4.0]);
+        assert_eq!(at(2), [2.0, 1.0]);
+    }
+}

@@ -4,7 +4,8 @@
 //! returns a [`Solution`] that has been judged by its relative KKT residual. Inside, from the bottom up: `cholesky` (faer's
 //! factorisation), `interior` (the unknowns and the factor that is analysed once), `system` (the inequality in one or two
 //! fields, vertex by vertex), `free` (the linear problem on a fixed contact set), `active_set` and its fallback `monotone`,
-//! `interior_point` (clarabel), `reduce` (the smallest model and the way back), `level` (which model by which method, forces
+//! `multigrid` (cycles over the bisection
+//! hierarchy), `interior_point` (clarabel), `reduce` (the smallest model and the way back), `level` (which model by which method, forces
 //! and sigma).
 
 #[cfg(test)]

@@ -31,7 +31,8 @@ pub enum Status {
 /// Always returned beside a solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolveInfo {
-    /// Name of the solver as in the scene file, for example `active-set`; with `+monotone` where the fallback finished.
+    /// Name of the solver as in the scene file, for example `active-set`; with `+monotone` where the fallback finished, and
+    /// `multigrid+active-set` where multigrid missed its goal and handed over. On a mesh without bisections multigrid is `active-set`.
     pub solver: &'static str,
     /// The model that was solved.
     pub reduction: Reduction,
@@ -69,6 +70,8 @@ pub struct Cycles {
     pub mean: usize,
     /// Steps for sigma.
     pub sigma: usize,
+    /// Factorisations of the matrix of the initial mesh, those for sigma included where it shares the matrix of the model.
+    pub factorisations: usize,
 }
 
 /// Nodal solution of a [`DiscreteProblem`], one entry a vertex, boundary included.

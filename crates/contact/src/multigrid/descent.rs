@@ -73,6 +73,8 @@ pub(crate) struct Report {
     pub steps: usize,
     /// Monotone cycles.
     pub monotone: usize,
+    /// Factorisations of the initial mesh so far, by the levels that were used.
+    pub factorisations: usize,
     /// How it ended.
     pub status: Status,
     /// Estimate of the squared error in the norm of the matrix.
@@ -210,6 +212,7 @@ impl<'a, U: Unknowns> Descent<'a, U> {
     pub fn run(&mut self, goal: Goal, cold: bool, left: Option<f64>) -> Result<Report, SolveError> {
         let mut report = self.descend(goal, cold, left)?;
         report.monotone = self.monotone_cycles;
+        report.factorisations = self.levels.initial.factorisations;
         Ok(report)
     }
 
@@ -217,6 +220,7 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         let mut report = Report {
             steps: 0,
             monotone: 0,
+            factorisations: 0,
             status: Status::Converged,
             error_squared: 0.0,
             ratio: None,

@@ -42,6 +42,9 @@ const KKT: f64 = 1e-10;
 /// The inequality is solved to this part of a prescribed KKT residual: the mean takes the rest.
 const SHARE: f64 = 0.9;
 
+/// With a contraction beyond this every level takes steps enough to see how far it has come.
+const SLOW: f64 = 0.25;
+
 /// What the part left by a first step grows by when it is handed on unseen: after about ten levels of one step each it is looked at
 /// again.
 const AGEING: f64 = 1.25;
@@ -356,14 +359,22 @@ impl Run<'_> {
                 .map(|ratio| ratio.clamp(0.0, 1.0).sqrt())
         };
         let inherited = self.start.and_then(|s| s.first_cycle);
-        let first_cycle = root_of_largest(|r| r.left)
-            .or_else(|| inherited.map(|c| (c * c * AGEING).min(0.5).sqrt()));
+        let contraction = root_of_largest(|r| r.ratio);
+        let first_cycle = match contraction {
+            // Here single steps are not to be trusted.
+            Some(c) if c > SLOW => None,
+            Some(_) => root_of_largest(|r| r.left),
+            None => inherited.map(|c| (c * c * AGEING).min(0.5).sqrt()),
+        };
         let steps = |r: Option<Report>| r.map_or(0, |r| r.steps);
         let cycles = Cycles {
             inequality: inequality.steps,
             monotone: inequality.monotone,
             mean: steps(model.mean),
             sigma: steps(sigma_report),
+            factorisations: sigma_report
+                .map_or(0, |r| r.factorisations)
+                .max(inequality.factorisations),
         };
         let n = self.level.interior.len();
         let info = SolveInfo {
@@ -378,7 +389,7 @@ impl Run<'_> {
             },
             kkt_residual: kkt_residual(problem, &displacement, &force),
             algebraic_error: Some(model.error_squared.max(0.0).sqrt()),
-            contraction: root_of_largest(|r| r.ratio),
+            contraction,
             first_cycle,
             cycles: Some(cycles),
         };

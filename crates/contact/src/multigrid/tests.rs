@@ -2,6 +2,7 @@
 
 use fem_core::{Children, Mesh};
 
+use super::descent::{Descent, Vectors};
 use super::finest::Finest;
 use super::galerkin::Levels;
 use super::hierarchy::Hierarchy;
@@ -347,4 +348,50 @@ fn inverses_of_pairs() {
         let moved = times(inverse, times(glued, kernel));
         assert!(moved[0].abs() + moved[1].abs() < 1e-12);
     }
+}
+
+#[test]
+fn gaps_that_a_monotone_cycle_closes_are_closed_exactly() {
+    let mut mesh = distorted(4, 0.2, 3);
+    for _ in 0..3 {
+        mesh.refine_uniformly(Children::Four).unwrap();
+    }
+    let data = Data {
+        tensions: [&|_, _| 1.0, &|x, _| if x > 0.0 { 1e4 } else { 3.0 }],
+        loads: [
+            &|x, y| 30.0 * (9.0 * x).sin() * (7.0 * y).cos() - 12.0,
+            &|_, _| 1.0,
+        ],
+        heights: [&|_, _| 0.0, &|_, _| 0.0],
+    };
+    let problem = data.on(&mesh);
+    let h = Hierarchy::new(&problem);
+    let matrices = [&problem.stiffness[0], &problem.stiffness[1]];
+    let finest = Finest::<Pair>::new(&h, &matrices);
+    let mut levels = Levels::<Pair>::new(&h);
+    let load = |p: usize, i: usize| problem.loads[i].nodal[h.vertex[p] as usize];
+    let values = Vectors {
+        x: vec![[0.0; 2]; h.len()],
+        b: (0..h.len())
+            .map(|p| [0, 1].map(|i| if h.fixed[p] { 0.0 } else { load(p, i) }))
+            .collect(),
+        boundary_size: 0.0,
+        plain: false,
+    };
+    let scale = |_: usize| 0.0;
+    let mut descent = Descent::new(&h, &finest, &mut levels, &matrices, true, &scale, values);
+    descent.settle();
+    descent.monotone_start().unwrap();
+    let size = descent.x.iter().map(|&u| Pair::size(u)).fold(0.0, f64::max);
+    let (mut closed, mut open) = (0, 0);
+    for p in (0..h.len()).filter(|&p| !h.fixed[p]) {
+        match Pair::gap(descent.x[p]) {
+            0.0 => closed += 1,
+            gap => {
+                assert!(gap > 1e-13 * size, "{gap:e} of {size:e}");
+                open += 1;
+            }
+        }
+    }
+    assert!(closed > 100 && open > 100, "{closed} {open}");
 }

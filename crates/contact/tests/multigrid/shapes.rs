@@ -11,6 +11,8 @@ use crate::problems::*;
 struct Steps {
     /// The largest number of steps for the inequality where multigrid finished.
     most: usize,
+    /// The largest number of factorisations of the initial mesh.
+    factorisations: usize,
     /// Levels that multigrid finished.
     finished: usize,
     /// Levels that went over to the active set method.
@@ -50,6 +52,7 @@ fn levels(
             ("multigrid", Some(cycles)) => {
                 steps.finished += 1;
                 steps.most = steps.most.max(cycles.inequality);
+                steps.factorisations = steps.factorisations.max(cycles.factorisations);
                 assert!(cycles.mean <= 60 && cycles.sigma <= 60, "{cycles:?}");
             }
             ("multigrid+active-set", Some(_)) => steps.handed_over += 1,
@@ -146,6 +149,15 @@ fn depth_does_not_matter() {
         assert!(depth >= Some(85), "{depth:?}");
         assert!(steps.most <= 12, "{}", steps.most);
         assert_eq!((steps.finished, steps.handed_over), (90, 0));
+        // And from nothing, where every level counts.
+        let problem = data.on(&mesh);
+        let settings = multigrid(Tolerance::Relative(1e-10), true);
+        let s = solve(&problem, &settings, None).expect("a solution");
+        println!("cold {:?}", s.info);
+        let cycles = s.info.cycles.expect("cycles");
+        assert_eq!(s.info.solver, "multigrid");
+        assert!(cycles.inequality + cycles.monotone <= 20, "{cycles:?}");
+        assert!(cycles.mean <= 13 && cycles.sigma <= 14, "{cycles:?}");
     }
 }
 
@@ -164,6 +176,8 @@ fn a_fine_initial_mesh_is_the_coarse_level() {
     };
     let (steps, ..) = levels(&PRESSED, square(64), 3, few, Children::Two);
     assert!(steps.most <= 12, "{}", steps.most);
+    // Fewer than one a step: the factor is kept while the truncation changes little.
+    assert!(steps.factorisations <= 6, "{}", steps.factorisations);
     assert_eq!((steps.finished, steps.handed_over), (3, 0));
 }
 

@@ -147,11 +147,13 @@ fn two_fields() {
         let found = count(&data, square(8), 15_000);
         assert!(found.nested.inequality <= most, "{:?}", found.nested);
         assert_cold(&found);
+        assert!(found.left <= 0.1, "{}", found.left);
         if most == 20 {
-            assert!(found.contraction <= 0.2 && found.left <= 0.1);
+            assert!(found.contraction <= 0.2, "{}", found.contraction);
+            assert!(found.few <= 3);
         } else {
-            // Parts of the error that decay slowly gather over the levels, unseen by the losses of a few steps.
-            assert!(found.left <= 0.3, "{}", found.left);
+            // The slow parts of the error were seen on earlier levels, and single steps are not trusted any more.
+            assert!(found.few >= 3, "{}", found.few);
         }
     }
 }
