@@ -1,8 +1,9 @@
-//! The numbers: reference values, rates, efficiency of the indicators, agreement of the solvers, covariance under scaling.
+//! The numbers: reference values, the certificate, rates, efficiency of the indicators, agreement of the solvers, covariance under scaling.
 
 mod agreement;
 mod cases;
 mod certificate;
+mod certificate_extremes;
 mod contact_set;
 mod covariance;
 mod efficiency;

@@ -33,9 +33,12 @@ pub struct Level {
     pub record: LevelRecord,
 }
 
-/// Under a balanced tolerance the estimated algebraic error is at most this part of the estimated error, and so is eta_alg
-/// beside eta where a bound is reported as guaranteed.
+/// Under a balanced tolerance the estimated algebraic error is at most this part of the estimated error.
 pub const BALANCE: f64 = 0.1;
+
+/// On a level whose bound is reported as guaranteed eta_alg is at most this part of eta: it is added to the bound, and a part ten times
+/// smaller costs an iterative solver one step.
+pub const SETTLED: f64 = 0.01;
 
 /// How often a level is solved to a higher accuracy before its balance is given up.
 const ROUNDS: usize = 8;
@@ -192,7 +195,7 @@ impl Level {
     pub(crate) fn settle(&mut self, context: Context<'_>) -> Result<(), LevelError> {
         self.balance(context, |estimates, algebraic| {
             let certificate = estimates.certificate.as_ref()?;
-            let share = BALANCE * certificate.eta;
+            let share = SETTLED * certificate.eta;
             // eta_alg falls with the algebraic error.
             (certificate.algebraic > share).then(|| 0.8 * algebraic * share / certificate.algebraic)
         })?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use adapt::settings::{Children, Estimator, Fields, Stop, Strategy};
+use adapt::settings::{Children, Estimator, Fields, Final, Stop, Strategy};
 use contact::{Solver, Tolerance};
 use scene::{Scene, from_text};
 
@@ -25,7 +25,8 @@ fn a_scene_with_nothing_but_a_domain() {
     assert_eq!(settings.solve.solver, Solver::Auto);
     assert_eq!(settings.solve.tolerance, Tolerance::Balanced);
     assert!(settings.solve.reduce);
-    assert_eq!(settings.estimate.estimator, Estimator::Residual);
+    assert_eq!(settings.estimate.estimator, Estimator::Certified);
+    assert_eq!(settings.estimate.last, Final::Sharp);
     assert_eq!(
         settings.estimate.also,
         [Estimator::Paper, Estimator::Residual]

@@ -117,7 +117,7 @@ pub(crate) fn check_summary(
 ) {
     let claimed = summary.get(KEY).filter(|value| !value.is_null());
     let Some(certificate) = level else {
-        let wrong = claimed.map(|_| "the scene asks for none, or it has no fields".to_owned());
+        let wrong = claimed.map(|_| "the scene asks for none".to_owned());
         report.property(SUMMARY, KEY, wrong);
         return;
     };

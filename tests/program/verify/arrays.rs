@@ -181,7 +181,7 @@ fn meshes() {
     let change = |c: &Copy| c.reals(LAST, "Points", |p| p[0] = f64::NAN);
     found("no number", change, &["value 0 of `Points` is NaN"]);
     let change = |c: &Copy| c.integer::<8>(LAST, "connectivity", 4, 3);
-    found("a corner", change, &["`level_0002.vtu`: `fields`"]);
+    found("a corner", change, &["`cover of the domain`"]);
     for wild in [1 << 20, 1 << 33, u64::MAX] {
         let change = |c: &Copy| c.integer::<8>(LAST, "connectivity", 4, wild);
         found("no such vertex", change, &["vertex"]);

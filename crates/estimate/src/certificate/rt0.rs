@@ -199,7 +199,7 @@ impl Reconstruction for Fluxes<'_> {
         // Entering and leaving flux, and the points opposite to the spokes that they pass.
         let centre = [0, 1].map(|c| (v[c] + corner(1)[c] + corner(2)[c]) / 3.0);
         let middle = |l: usize| [0, 1].map(|c| 0.5 * (v[c] + corner(l)[c]));
-        let (enters, leaves, opposite, other) = if part % 2 == 0 {
+        let (enters, leaves, opposite, other) = if part.is_multiple_of(2) {
             (alpha, alpha + h, centre, middle(1))
         } else {
             (alpha + h, alpha + 2.0 * h, middle(2), centre)

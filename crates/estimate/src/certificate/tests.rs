@@ -136,10 +136,10 @@ fn by_quadrature(mesh: &Mesh, fluxes: &dyn Reconstruction, t: usize, i: usize) -
     let corner = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let middle = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
     let mut sum = 0.0;
-    for part in 0..6 {
+    for part in 0..6usize {
         let k = part / 2;
         let centre = [1.0 / 3.0; 3];
-        let corners = if part % 2 == 0 {
+        let corners = if part.is_multiple_of(2) {
             [corner[k], middle(corner[k], corner[(k + 1) % 3]), centre]
         } else {
             [corner[k], centre, middle(corner[k], corner[(k + 2) % 3])]
