@@ -352,6 +352,11 @@ fn certificate_steers_the_solver() {
             let n = b.mesh.vertex_count();
             println!("{name} {n}: error {:.4} of the full one", b_error / f_error);
             assert!(b_error <= 1.005 * f_error, "{name} {n}");
+            let bound = b.estimates.bound;
+            assert!(
+                bound >= b_error && bound <= 1.8 * b_error,
+                "{name} {n}: {bound}"
+            );
         }
         let last = balanced.last().expect("levels");
         let found = last.estimates.certificate.as_ref().expect("wanted");

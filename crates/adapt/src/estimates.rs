@@ -8,6 +8,7 @@ use estimate::{
 };
 use fem_core::{FieldError, Mesh, Scale, TriangleId};
 
+use crate::level::BALANCE;
 use crate::problem::Problem;
 use crate::run::LevelError;
 use crate::settings::{Estimator, Settings};
@@ -40,6 +41,8 @@ pub struct Estimates {
     pub unseen: f64,
     /// The number that the run is judged by.
     pub bound: f64,
+    /// Whether the bound is predicted: with the estimated algebraic error in place of eta_alg, since that is large beside eta.
+    pub predicted: bool,
     /// What the bound would be without eta_alg: within reach of the solver on this mesh.
     pub reachable: f64,
     /// The size of the energy error as far as the estimators tell; the certificate's eta, or a fifth of the residual estimator.
@@ -144,10 +147,12 @@ impl Estimates {
             largest_contribution: largest.sqrt(),
             energy: estimate::energy(mesh, discrete, solution),
             bound,
+            predicted: false,
             reachable: bound,
             error_size: None,
         };
-        estimates.judge(settings.estimate.estimator == Estimator::Certified);
+        let drives = settings.estimate.estimator == Estimator::Certified;
+        estimates.judge(drives, solution.info.algebraic_error);
         Ok(estimates)
     }
 
@@ -173,21 +178,31 @@ impl Estimates {
         } else {
             1.0
         };
-        if drives {
-            self.bound = new.bound;
-        }
         self.certificate = Some(new);
-        self.judge(drives);
+        self.judge(drives, solution.info.algebraic_error);
         Ok(ratio)
     }
 
+    /// The bound as it is guaranteed, whatever eta_alg is; for a level that may be the last.
+    pub(crate) fn guarantee(&mut self, drives: bool) {
+        self.judge(drives, None);
+    }
+
     /// What follows from the certificate, or from the residual estimator where there is none.
-    fn judge(&mut self, drives: bool) {
+    ///
+    /// `algebraic` is the algebraic error as an iterative solver estimates it.
+    fn judge(&mut self, drives: bool, algebraic: Option<f64>) {
         self.reachable = self.bound;
         if let Some(certificate) = &self.certificate {
             self.error_size = Some(certificate.eta);
             if drives {
-                self.reachable = certificate.without_algebraic();
+                self.reachable = certificate.predicted(0.0);
+                let loose = certificate.algebraic > BALANCE * certificate.eta;
+                self.predicted = loose && algebraic.is_some();
+                self.bound = match algebraic.filter(|_| loose) {
+                    Some(algebraic) => certificate.predicted(algebraic),
+                    None => certificate.bound,
+                };
             }
         } else if let Some(residual) = &self.residual {
             self.error_size = Some(RESIDUAL_SHARE * root_sum(residual));

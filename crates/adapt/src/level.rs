@@ -230,6 +230,15 @@ impl Level {
         Ok(ratio)
     }
 
+    /// Reports the bound with eta_alg in it, however large that is.
+    pub(crate) fn guarantee(&mut self, context: Context<'_>) -> Result<(), LevelError> {
+        let drives = context.settings.estimate.estimator == Estimator::Certified;
+        self.estimates.guarantee(drives);
+        self.renew(context)?;
+        self.stamp(context);
+        Ok(())
+    }
+
     /// Computes sigma if it was left out; before fields are written.
     pub(crate) fn complete(&mut self, context: Context<'_>) -> Result<(), LevelError> {
         if needs_sigma(context.problem, context.settings) {

@@ -53,7 +53,7 @@ pub struct LevelRecord {
     pub oscillation: f64,
     /// The number that the run is judged by.
     pub error_bound: f64,
-    /// Which number that is: `rt0`, `rt1`, `residual` or `paper`.
+    /// Which number that is: `rt0`, `rt1`, `predicted`, `residual` or `paper`.
     pub bound_kind: &'static str,
     /// error_bound / energy_norm; none when the norm is zero.
     pub relative_bound: Option<f64>,
@@ -114,6 +114,7 @@ impl LevelRecord {
         let bound_exponent = bound_unit(settings.estimate.estimator, scale);
         let certificate = estimates.certificate.as_ref();
         let bound_kind = match settings.estimate.estimator {
+            Estimator::Certified if estimates.predicted => "predicted",
             Estimator::Certified => match certificate.map(|c| c.grade) {
                 Some(Grade::Rt1) => "rt1",
                 _ => "rt0",

@@ -85,6 +85,7 @@ fn finish(
     if sharp {
         *sharpness = level.sharpen(context)?;
     }
+    level.guarantee(context)?;
     Ok(reason(level, level.estimates.bound))
 }
 

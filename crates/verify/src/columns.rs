@@ -104,7 +104,7 @@ impl<'a> Recomputed<'a> {
     /// The number that the run is judged by.
     pub fn bound(&self) -> Option<Number> {
         match self.settings.estimate.estimator {
-            Estimator::Certified => Some(self.certificate.as_ref()?.bound),
+            Estimator::Certified => Some(self.certificate.as_ref()?.judged()),
             Estimator::Residual => {
                 let local = self.residual.as_ref()?;
                 Some(local.root(self.scale.energy_norm()))

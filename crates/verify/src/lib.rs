@@ -89,6 +89,7 @@ pub fn verify(path: &Path) -> Result<Report, VerifyError> {
             // The level that a failed run kept was not meant to be its last.
             last: last && code != 3,
             claimed: history.text(number, "bound_kind"),
+            algebraic: history.number(number, "algebraic_error"),
         };
         let file = match with_fields.binary_search(&number) {
             Ok(_) => level::read(&folder, number, &scene, &mut report)?,

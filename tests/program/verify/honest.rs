@@ -78,6 +78,25 @@ fn every_way_to_run_a_scene() {
         ),
         ("square", &["solve.reduction=\"off\"", "stop.levels=3"], 1),
         (
+            "square",
+            &[
+                "solve.solver=\"multigrid\"",
+                "output.fields=\"all\"",
+                "stop.levels=6",
+            ],
+            6,
+        ),
+        ("square", &["estimate.final=\"fast\"", "stop.levels=3"], 1),
+        (
+            "square",
+            &[
+                "estimate.estimator=\"residual\"",
+                "estimate.also=[\"certified\"]",
+                "stop.levels=3",
+            ],
+            1,
+        ),
+        (
             "full-contact",
             &["solve.reduction=\"off\"", "stop.levels=3"],
             1,

@@ -89,9 +89,9 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// What (B1) would be if the rows held to rounding.
-    pub fn without_algebraic(&self) -> f64 {
-        bound(self.eta, self.contact)
+    /// (B1) with an estimate of the algebraic error in place of eta_alg: 0 if the rows hold to rounding. Guaranteed only so far as the estimate is.
+    pub fn predicted(&self, algebraic: f64) -> f64 {
+        bound(self.eta + algebraic, self.contact)
     }
 }
 
