@@ -2,7 +2,7 @@
 
 use estimate::{BoundaryOscillation, Certificate, boundary_oscillation};
 use fem_core::scale::times_power_of_two;
-use fem_core::{FieldError, Mesh};
+use fem_core::{Circle, FieldError, Mesh};
 
 use crate::problem::Problem;
 
@@ -31,9 +31,9 @@ impl Assurance {
             guaranteed: true,
             caveats: Vec::new(),
         };
-        if mesh.curve().is_some() {
+        if let Some(circle) = mesh.curve() {
             assurance.guaranteed = false;
-            let distance = times_power_of_two(sagitta(mesh), scale.length);
+            let distance = times_power_of_two(sagitta(mesh, circle), scale.length);
             assurance.caveats.push(format!(
                 "the bound holds for the polygon of the mesh, which is up to {distance:.1e} away from the circle"
             ));
@@ -62,10 +62,7 @@ impl Assurance {
 }
 
 /// The largest distance between an edge on the boundary and the circle that it stands for.
-fn sagitta(mesh: &Mesh) -> f64 {
-    let Some(circle) = mesh.curve() else {
-        return 0.0;
-    };
+fn sagitta(mesh: &Mesh, circle: Circle) -> f64 {
     let mut largest = 0.0f64;
     for (t, face) in mesh.boundary_edges() {
         let [p, q] = mesh.face(t, face).map(|v| mesh.points()[v.index()]);

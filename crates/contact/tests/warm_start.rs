@@ -2,7 +2,9 @@
 
 mod common;
 
-use common::{Data, Function, assert_exact, difference, distorted, square};
+use common::{
+    Data, Function, assert_exact, difference, distorted, jumping_action, smooth_action, square,
+};
 use contact::{Settings, Solution, Solver, Start, solve};
 use fem_core::{Children, Mesh, VertexId};
 
@@ -44,44 +46,6 @@ fn levels(
 
 fn everything(mesh: &Mesh, _: &Solution) -> Vec<fem_core::TriangleId> {
     mesh.triangle_ids().collect()
-}
-
-/// Continuous action in the disk of radius 1/2; tensions 1 and 2, heights zero. With P = (1 - x^2)(1 - y^2) and
-/// q = max(0, x^2 + y^2 - 1/4) the displacements are P/3 + 2/3 P q^2 and P/3 - 1/3 P q^2, the action 5 - 20 (x^2 + y^2) in the disk.
-fn smooth_action(membrane: usize, x: f64, y: f64) -> f64 {
-    let r2 = x * x + y * y;
-    let q = (r2 - 0.25).max(0.0);
-    let (a, b) = (1.0 - x * x, 1.0 - y * y);
-    // laplace P, and laplace (P q^2) = q^2 laplace P + 2 grad P . grad q^2 + P laplace q^2, zero in the disk.
-    let lp = -2.0 * (a + b);
-    let lpq = if q > 0.0 {
-        q * q * lp - 16.0 * q * (x * x * b + y * y * a) + a * b * (8.0 * r2 + 8.0 * q)
-    } else {
-        0.0
-    };
-    let action = (5.0 - 20.0 * r2).max(0.0);
-    if membrane == 0 {
-        -(lp / 3.0 + 2.0 / 3.0 * lpq) - action
-    } else {
-        -2.0 * (lp / 3.0 - lpq / 3.0) + action
-    }
-}
-
-/// Action 5 in a disk off the centre, 0 outside; tensions 1, heights zero, gap P q^2 and mean P/2.
-fn jumping_action(membrane: usize, x: f64, y: f64) -> f64 {
-    let (cx, cy) = (x - 0.23, y + 0.17);
-    let rho = cx * cx + cy * cy;
-    let q = (rho - 0.1681).max(0.0);
-    let (a, b) = (1.0 - x * x, 1.0 - y * y);
-    let lp = -2.0 * (a + b);
-    let lpq = if q > 0.0 {
-        q * q * lp - 16.0 * q * (x * b * cx + y * a * cy) + a * b * (8.0 * rho + 8.0 * q)
-    } else {
-        0.0
-    };
-    let action = if rho < 0.1681 { 5.0 } else { 0.0 };
-    let sign = if membrane == 0 { 1.0 } else { -1.0 };
-    -(0.5 * lp + sign * 0.5 * lpq) - sign * action
 }
 
 #[test]

@@ -11,7 +11,7 @@
 
 use std::sync::Arc;
 
-use fem_core::integrate::{Control, Integrand, Judgement, Piece, integrate};
+use fem_core::integrate::{Control, Integrand, Judgement, Piece, integrate, squared_error};
 use fem_core::quadrature::{POINTS, affine_misfit};
 use fem_core::{Field, FieldError, Mesh, Samples};
 
@@ -204,14 +204,9 @@ impl Integrand for SquaredError<'_> {
         }
         let largest = largest.sqrt();
         let misfit = affine_misfit(piece.rule, &v[0]) + affine_misfit(piece.rule, &v[1]);
-        let error = if misfit == 0.0 {
-            0.0
-        } else {
-            (3.0 * misfit / largest).min(1.0).powi(4) * largest * largest
-        };
         Judgement {
             magnitude: piece.area * (square + FLOOR * FLOOR * floor),
-            error: piece.area * error,
+            error: piece.area * squared_error(misfit, largest),
         }
     }
 

@@ -4,45 +4,10 @@ use contact::{DiscreteProblem, Settings, Solution, Solver, Start, Tolerance, sol
 use fem_core::{Children, Mesh, TriangleId, VertexId};
 
 use crate::common::{Data, Function, Random, square};
+pub use crate::common::{jumping_action, smooth_action};
 
 pub const ZERO: Function = &|_, _| 0.0;
 pub const ONE: Function = &|_, _| 1.0;
-
-/// P2: continuous action in the disk of radius 1/2; tensions 1 and 2, heights zero.
-pub fn smooth_action(membrane: usize, x: f64, y: f64) -> f64 {
-    let r2 = x * x + y * y;
-    let q = (r2 - 0.25).max(0.0);
-    let (a, b) = (1.0 - x * x, 1.0 - y * y);
-    let lp = -2.0 * (a + b);
-    let lpq = if q > 0.0 {
-        q * q * lp - 16.0 * q * (x * x * b + y * y * a) + a * b * (8.0 * r2 + 8.0 * q)
-    } else {
-        0.0
-    };
-    let action = (5.0 - 20.0 * r2).max(0.0);
-    if membrane == 0 {
-        -(lp / 3.0 + 2.0 / 3.0 * lpq) - action
-    } else {
-        -2.0 * (lp / 3.0 - lpq / 3.0) + action
-    }
-}
-
-/// P8: action 5 in a disk off the centre, 0 outside; tensions 1, heights zero.
-pub fn jumping_action(membrane: usize, x: f64, y: f64) -> f64 {
-    let (cx, cy) = (x - 0.23, y + 0.17);
-    let rho = cx * cx + cy * cy;
-    let q = (rho - 0.1681).max(0.0);
-    let (a, b) = (1.0 - x * x, 1.0 - y * y);
-    let lp = -2.0 * (a + b);
-    let lpq = if q > 0.0 {
-        q * q * lp - 16.0 * q * (x * b * cx + y * a * cy) + a * b * (8.0 * rho + 8.0 * q)
-    } else {
-        0.0
-    };
-    let action = if rho < 0.1681 { 5.0 } else { 0.0 };
-    let sign = if membrane == 0 { 1.0 } else { -1.0 };
-    -(0.5 * lp + sign * 0.5 * lpq) - sign * action
-}
 
 /// Many contact sets: a wave presses and pulls.
 pub fn islands(x: f64, y: f64) -> f64 {

@@ -1,6 +1,8 @@
 //! From reconstructed fluxes to ||mu^(-1/2)(s_i + mu_i grad u_ih)||_K and ||f_i +- lambda_h - r_i - div s_i||_K.
 
-use fem_core::integrate::{Control, Integrand, Judgement, Partition, Piece, WHOLE_PART, integrate};
+use fem_core::integrate::{
+    Control, Integrand, Judgement, Partition, Piece, WHOLE_PART, integrate, squared_error,
+};
 use fem_core::quadrature::{POINTS, affine_misfit};
 use fem_core::{FieldError, Mesh, Samples, TriangleId};
 
@@ -292,12 +294,8 @@ fn sum(piece: &Piece<'_>, values: &[f64; POINTS]) -> f64 {
 fn judged(piece: &Piece<'_>, values: &[f64; POINTS]) -> (f64, f64) {
     let largest = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     let misfit = affine_misfit(piece.rule, values);
-    let error = if misfit == 0.0 {
-        0.0
-    } else {
-        (3.0 * misfit / largest).min(1.0).powi(4) * largest * largest
-    };
-    (sum(piece, values), piece.area * error)
+    let error = piece.area * squared_error(misfit, largest);
+    (sum(piece, values), error)
 }
 
 /// An error that does not matter beside the element's own contribution counts as none.

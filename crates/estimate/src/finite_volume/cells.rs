@@ -1,6 +1,6 @@
 //! Integrals of functions that are constant on the dual cells.
 
-use fem_core::integrate::{Control, Integrand, Judgement, Piece, integrate};
+use fem_core::integrate::{Control, Integrand, Judgement, Piece, integrate, squared_error};
 use fem_core::quadrature::affine_misfit;
 use fem_core::{Field, FieldError, Mesh, Samples};
 
@@ -81,14 +81,9 @@ impl Integrand for SquaredError<'_> {
             floor += point.weight * v * v;
         }
         let misfit = affine_misfit(piece.rule, values);
-        let error = if misfit == 0.0 {
-            0.0
-        } else {
-            (3.0 * misfit / largest).min(1.0).powi(4) * largest * largest
-        };
         Judgement {
             magnitude: piece.area * (square + FLOOR * FLOOR * floor),
-            error: piece.area * error,
+            error: piece.area * squared_error(misfit, largest),
         }
     }
 

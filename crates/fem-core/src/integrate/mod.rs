@@ -11,7 +11,9 @@ use crate::quadrature::{POINTS, RulePoint, rule};
 
 mod loads;
 
-pub use loads::{LOAD_CONTROL, Loads, judge_load, load_pair, loads, means, smooth_error};
+pub use loads::{
+    LOAD_CONTROL, Loads, judge_load, load_pair, loads, means, smooth_error, squared_error,
+};
 
 /// Something to be integrated over every element by [`integrate`].
 pub trait Integrand {
