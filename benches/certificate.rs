@@ -62,7 +62,7 @@ impl Case {
                 .collect()
         };
         let heights = [height(0.05), height(0.0)];
-        let discrete = DiscreteProblem::new(&mesh, means, loads, heights);
+        let discrete = DiscreteProblem::new(mesh.clone(), means, loads, heights);
         let solution = contact::solve(&discrete, &Settings::default(), None).expect("solved");
         Case {
             mesh,
@@ -153,7 +153,7 @@ fn main() {
         let case = Case::new(refinements);
         let (n, count) = (case.mesh.vertex_count(), case.mesh.triangle_count());
         let x = &case.solution.displacement[0];
-        let matrix = &case.discrete.stiffness[0];
+        let matrix = case.discrete.stiffness(0);
         let mut y = vec![0.0; n];
         let product = best(20, || {
             for (j, y) in y.iter_mut().enumerate() {

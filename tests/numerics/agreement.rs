@@ -160,7 +160,7 @@ fn assert_same_contact(name: &str, level: &Level, other: &Solution, strict: f64)
         .flatten()
         .fold(0.0f64, |m, u| m.max(u.abs()));
     let unit = if unit == 0.0 { 1.0 } else { unit };
-    for j in (0..level.discrete.order()).filter(|&j| !level.discrete.boundary[j]) {
+    for j in (0..level.discrete.order()).filter(|&j| !level.discrete.boundary()[j]) {
         let clear = (solution.gap(j) / unit)
             .max(solution.force[j] / (level.discrete.harmonic_diagonal(j) * unit));
         assert!(

@@ -254,8 +254,11 @@ fn certificate_marks_like_the_true_error() {
             let mut points = Vec::new();
             let mut start = None;
             loop {
-                let (discrete, moments) =
-                    adapt::discretise_with_moments(&problem, &problem.mesh).expect("good data");
+                let (discrete, moments) = adapt::discretise_with_moments(
+                    &problem,
+                    &std::sync::Arc::new(problem.mesh.clone()),
+                )
+                .expect("good data");
                 let settings = SolveSettings::default();
                 let solution =
                     contact::solve(&discrete, &settings, start.as_ref()).expect("solved");

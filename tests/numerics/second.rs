@@ -77,14 +77,14 @@ fn sigma_error(name: &str, problem: &Problem, level: &Level) -> f64 {
     let exact = sigma_seminorm_squared(name).expect("|sigma|_1 known");
     let exact = times_power_of_two(exact, -2 * problem.scale.force());
     let mixed = action_times(problem, level);
-    (exact - 2.0 * mixed + level.discrete.laplacian.quadratic(&level.solution.sigma)).sqrt()
+    (exact - 2.0 * mixed + level.discrete.laplacian().quadratic(&level.solution.sigma)).sqrt()
 }
 
 /// (lambda, sigma_h), on a mesh refined along the border of the contact set until no sample can miss a part of the action that matters.
 fn action_times(problem: &Problem, level: &Level) -> f64 {
     let exact = problem.exact.as_ref().expect("exact");
     let (contact, action) = (exact.contact.as_deref(), exact.action.as_deref());
-    let mut mesh = level.mesh.clone();
+    let mut mesh = fem_core::Mesh::clone(&level.mesh);
     for _ in 0..6 {
         let centres: Vec<[f64; 2]> = mesh
             .triangle_ids()
@@ -435,8 +435,8 @@ fn fastest<T>(mut call: impl FnMut() -> T) -> f64 {
 
 /// Steps of conjugate gradients, preconditioned by the diagonal, until the residual of `K sigma = z` is 1e-8 of the first.
 fn steps(level: &Level) -> usize {
-    let (matrix, n) = (&level.discrete.laplacian, level.solution.force.len());
-    let inside: Vec<usize> = (0..n).filter(|&j| !level.discrete.boundary[j]).collect();
+    let (matrix, n) = (level.discrete.laplacian(), level.solution.force.len());
+    let inside: Vec<usize> = (0..n).filter(|&j| !level.discrete.boundary()[j]).collect();
     let mut rest = level.solution.force.clone();
     let (mut direction, mut product) = (vec![0.0; n], vec![0.0; n]);
     let (mut before, mut first) = (f64::INFINITY, f64::INFINITY);
@@ -475,7 +475,7 @@ fn cost_beside_a_matrix_vector_product() {
     for n in [64, 256] {
         let level = solved(&on("P2", &Grid::right(n), 0));
         let (mesh, discrete, solution) = (&level.mesh, &level.discrete, &level.solution);
-        let product = fastest(|| discrete.laplacian.multiply(&solution.sigma));
+        let product = fastest(|| discrete.laplacian().multiply(&solution.sigma));
         let paper = fastest(|| estimate::paper(mesh, discrete, solution)) / product;
         let residual =
             fastest(|| root_sum(&estimate::residual(mesh, discrete, solution))) / product;

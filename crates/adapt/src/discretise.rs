@@ -45,7 +45,7 @@ pub enum DataError {
 ///
 /// # Errors
 /// [`DataError`] where data are not finite, a tension is not positive, or g1 < g2.
-pub fn discretise(problem: &Problem, mesh: &Mesh) -> Result<DiscreteProblem, DataError> {
+pub fn discretise(problem: &Problem, mesh: &Arc<Mesh>) -> Result<DiscreteProblem, DataError> {
     let loads = || load_pair(mesh, [&*problem.load[0], &*problem.load[1]]);
     let (discrete, ()) = assemble(problem, mesh, || Ok((loads()?, ())))?;
     Ok(discrete)
@@ -57,7 +57,7 @@ pub fn discretise(problem: &Problem, mesh: &Mesh) -> Result<DiscreteProblem, Dat
 /// As [`discretise`].
 pub fn discretise_with_moments(
     problem: &Problem,
-    mesh: &Mesh,
+    mesh: &Arc<Mesh>,
 ) -> Result<(DiscreteProblem, Moments), DataError> {
     assemble(problem, mesh, || {
         let load = [&*problem.load[0], &*problem.load[1]];
@@ -69,7 +69,7 @@ pub fn discretise_with_moments(
 
 fn assemble<T>(
     problem: &Problem,
-    mesh: &Mesh,
+    mesh: &Arc<Mesh>,
     loads: impl FnOnce() -> Result<([Loads; 2], T), FieldError>,
 ) -> Result<(DiscreteProblem, T), DataError> {
     let physical = |v: f64| fem_core::scale::times_power_of_two(v, problem.scale.length);
@@ -97,7 +97,10 @@ fn assemble<T>(
         return Err(DataError::Heights { x, y, excess });
     }
     let (loads, rest) = loads()?;
-    Ok((DiscreteProblem::new(mesh, tension, loads, heights), rest))
+    Ok((
+        DiscreteProblem::new(mesh.clone(), tension, loads, heights),
+        rest,
+    ))
 }
 
 /// Heights at the boundary vertices, 0 inside; `region` there is that of a triangle with an edge on the boundary.

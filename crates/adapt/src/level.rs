@@ -1,8 +1,9 @@
 //! One level of a run: mesh, discrete problem, solution, estimates, and the step to the next.
 
+use std::sync::Arc;
 use std::time::Instant;
 
-use contact::{DiscreteProblem, Solution, Start, Tolerance};
+use contact::{DiscreteProblem, Solution, Start, Tolerance, Workspace};
 use estimate::{Grade, Moments};
 use fem_core::{Mesh, TriangleId};
 
@@ -20,7 +21,7 @@ pub struct Level {
     /// Number, from 0.
     pub number: usize,
     /// The mesh.
-    pub mesh: Mesh,
+    pub mesh: Arc<Mesh>,
     /// Matrices and loads.
     pub discrete: DiscreteProblem,
     /// Moments of the data, where the certificate is wanted.
@@ -53,9 +54,12 @@ pub(crate) struct Context<'a> {
 
 impl Level {
     /// Solves and estimates on the initial mesh.
-    pub(crate) fn initial(context: Context<'_>) -> Result<Level, LevelError> {
-        let mesh = context.problem.mesh.clone();
-        Level::on(mesh, context, None, 0, 0.0)
+    pub(crate) fn initial(
+        context: Context<'_>,
+        workspace: &mut Workspace,
+    ) -> Result<Level, LevelError> {
+        let mesh = Arc::new(context.problem.mesh.clone());
+        Level::on(mesh, context, None, 0, 0.0, workspace)
     }
 
     /// Refines the marked triangles, carries the solution over, solves and estimates.
@@ -63,10 +67,11 @@ impl Level {
         &self,
         marked: &[TriangleId],
         context: Context<'_>,
+        workspace: &mut Workspace,
     ) -> Result<Level, LevelError> {
         let settings = context.settings;
         let clock = Instant::now();
-        let mut mesh = self.mesh.clone();
+        let mut mesh = Mesh::clone(&self.mesh);
         let children = match settings.mark.strategy {
             Strategy::Uniform => Children::Four,
             _ => settings.mark.children,
@@ -78,16 +83,24 @@ impl Level {
         let expected = self.estimates.error_size.map(|size| size * growth.sqrt());
         let seconds = clock.elapsed().as_secs_f64();
         let before = Some((carried, expected));
-        Level::on(mesh, context, before, self.number + 1, seconds)
+        Level::on(
+            Arc::new(mesh),
+            context,
+            before,
+            self.number + 1,
+            seconds,
+            workspace,
+        )
     }
 
     /// Solves and estimates on a mesh; `before` is the solution carried over from the level before and the error to be expected.
     fn on(
-        mesh: Mesh,
+        mesh: Arc<Mesh>,
         context: Context<'_>,
         before: Option<(Start, Option<f64>)>,
         number: usize,
         seconds_refine: f64,
+        workspace: &mut Workspace,
     ) -> Result<Level, LevelError> {
         let Context {
             problem, settings, ..
@@ -110,7 +123,7 @@ impl Level {
             sigma: needs_sigma(problem, settings),
             ..settings.solve
         };
-        let solution = contact::solve(&discrete, &solve, start.as_ref())?;
+        let solution = contact::solve_in(&discrete, &solve, start.as_ref(), workspace)?;
         let seconds_solve = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let estimates = Estimates::of(
@@ -137,7 +150,7 @@ impl Level {
             estimates,
             record,
         };
-        level.balance(context, |estimates, algebraic| {
+        level.balance(context, workspace, |estimates, algebraic| {
             let size = estimates.error_size?;
             (algebraic > BALANCE * size).then_some(BALANCE * size)
         })?;
@@ -150,6 +163,7 @@ impl Level {
     fn balance(
         &mut self,
         context: Context<'_>,
+        workspace: &mut Workspace,
         target: impl Fn(&Estimates, f64) -> Option<f64>,
     ) -> Result<(), LevelError> {
         let Context {
@@ -172,7 +186,7 @@ impl Level {
                 ..settings.solve
             };
             let start = Start::again(&self.solution);
-            let mut better = contact::solve(&self.discrete, &solve, Some(&start))?;
+            let mut better = contact::solve_in(&self.discrete, &solve, Some(&start), workspace)?;
             better.info.iterations += self.solution.info.iterations;
             self.solution = better;
             self.record.seconds_solve += clock.elapsed().as_secs_f64();
@@ -192,8 +206,12 @@ impl Level {
     }
 
     /// Iterates until eta_alg too is a small part of the certificate; for a level that may be the last.
-    pub(crate) fn settle(&mut self, context: Context<'_>) -> Result<(), LevelError> {
-        self.balance(context, |estimates, algebraic| {
+    pub(crate) fn settle(
+        &mut self,
+        context: Context<'_>,
+        workspace: &mut Workspace,
+    ) -> Result<(), LevelError> {
+        self.balance(context, workspace, |estimates, algebraic| {
             let certificate = estimates.certificate.as_ref()?;
             let share = SETTLED * certificate.eta;
             // eta_alg falls with the algebraic error.
@@ -240,12 +258,21 @@ impl Level {
     }
 
     /// Computes sigma if it was left out; before fields are written.
-    pub(crate) fn complete(&mut self, context: Context<'_>) -> Result<(), LevelError> {
+    pub(crate) fn complete(
+        &mut self,
+        context: Context<'_>,
+        workspace: &mut Workspace,
+    ) -> Result<(), LevelError> {
         if needs_sigma(context.problem, context.settings) {
             return Ok(());
         }
         let clock = Instant::now();
-        contact::add_sigma(&self.discrete, &context.settings.solve, &mut self.solution)?;
+        contact::add_sigma(
+            &self.discrete,
+            &context.settings.solve,
+            &mut self.solution,
+            workspace,
+        )?;
         self.record.seconds_solve += clock.elapsed().as_secs_f64();
         self.stamp(context);
         Ok(())

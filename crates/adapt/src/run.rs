@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use contact::SolveError;
+use contact::{SolveError, Workspace};
 use fem_core::scale::times_power_of_two;
 use fem_core::{FieldError, MeshError, Scale};
 
@@ -32,14 +32,18 @@ pub fn run(
         settings,
         begun: Instant::now(),
     };
+    let mut workspace = Workspace::default();
     let failed = |level: usize| move |cause: LevelError| RunError { level, cause };
-    let mut level = Level::initial(context).map_err(failed(0))?; // SOLVE, ESTIMATE
+    let mut level = Level::initial(context, &mut workspace).map_err(failed(0))?; // SOLVE, ESTIMATE
     let mut sharpness = SHARPNESS;
     loop {
         let number = level.number;
-        let reason = finish(&mut level, context, &mut sharpness).map_err(failed(number))?;
+        let reason =
+            finish(&mut level, context, &mut workspace, &mut sharpness).map_err(failed(number))?;
         if settings.output.wants_fields(number, reason.is_some()) {
-            level.complete(context).map_err(failed(number))?;
+            level
+                .complete(context, &mut workspace)
+                .map_err(failed(number))?;
         }
         observer
             .level(&level, reason)
@@ -48,11 +52,13 @@ pub fn run(
             return Ok(Outcome { reason, level });
         }
         let marked = mark(&level.estimates.marking, &settings.mark); // MARK
-        level = match level.refine(&marked, context) {
+        level = match level.refine(&marked, context, &mut workspace) {
             // REFINE, SOLVE, ESTIMATE
             Ok(next) => next,
             Err(cause) => {
-                level.complete(context).map_err(failed(number))?;
+                level
+                    .complete(context, &mut workspace)
+                    .map_err(failed(number))?;
                 observer
                     .failed(&level)
                     .map_err(|e| failed(number)(e.into()))?;
@@ -68,6 +74,7 @@ pub fn run(
 fn finish(
     level: &mut Level,
     context: Context<'_>,
+    workspace: &mut Workspace,
     sharpness: &mut f64,
 ) -> Result<Option<Reason>, LevelError> {
     let settings = context.settings;
@@ -81,7 +88,7 @@ fn finish(
     if reason(level, factor * level.estimates.reachable).is_none() {
         return Ok(None);
     }
-    level.settle(context)?;
+    level.settle(context, workspace)?;
     if sharp {
         *sharpness = level.sharpen(context)?;
     }

@@ -223,7 +223,7 @@ fn random_problem(seed: u64, n: usize, strength: f64, kind: usize) -> DiscretePr
             ..Loads::default()
         }
     });
-    DiscreteProblem::new(&mesh, tension, loads, heights)
+    DiscreteProblem::new(mesh, tension, loads, heights)
 }
 
 proptest! {

@@ -57,7 +57,7 @@ impl<'a> Level<'a> {
     pub fn new(problem: &'a DiscreteProblem, settings: &Settings) -> Level<'a> {
         Level {
             problem,
-            interior: Interior::new(&problem.boundary),
+            interior: Interior::new(problem.boundary()),
             reduce: settings.reduce,
             with_sigma: settings.sigma,
             scalar: None,
@@ -94,11 +94,11 @@ impl<'a> Level<'a> {
         let mut found = run(&system, &mut solver, guess, method)?;
         let mean = mean(model, interior, &mut scalar, start)?;
         self.scalar = Some(scalar);
-        let displacement = model.displacements(&self.interior, &mean, &found.fields[0]);
+        let displacement = model.fields(&self.interior, &mean, &found.fields[0]);
         if let Some(multiplier) = &mut found.multiplier {
             model.forces(multiplier);
         }
-        let reduction = self.named(&found.contact, model.reduction);
+        let reduction = named(self.problem, &found.contact, model.reduction);
         self.finish(displacement, found, reduction)
     }
 
@@ -121,7 +121,7 @@ impl<'a> Level<'a> {
         let mut fields = std::mem::take(&mut found.fields).into_iter();
         let displacement = [(); 2].map(|()| fields.next().unwrap_or_default());
         let reduction = if self.reduce {
-            self.named(&found.contact, Reduction::TwoField)
+            named(self.problem, &found.contact, Reduction::TwoField)
         } else {
             Reduction::TwoField
         };
@@ -140,7 +140,9 @@ impl<'a> Level<'a> {
             Some(force) => force,
             None => self.forces(&displacement, &found.contact),
         };
-        let sigma = if !self.with_sigma || force.iter().all(|&z| z == 0.0) {
+        let sigma = if !self.with_sigma {
+            Vec::new()
+        } else if force.iter().all(|&z| z == 0.0) {
             vec![0.0; self.problem.order()]
         } else {
             self.sigma(&force)?
@@ -187,7 +189,7 @@ impl<'a> Level<'a> {
     fn take_scalar(&mut self) -> Result<ScalarFactor, SolveError> {
         match self.scalar.take() {
             Some(factor) => Ok(factor),
-            None => ScalarFactor::new(&self.problem.pattern, &self.interior),
+            None => ScalarFactor::new(self.problem.pattern(), &self.interior),
         }
     }
 
@@ -196,7 +198,7 @@ impl<'a> Level<'a> {
     fn first_set(&self, system: &System, start: Option<&Start>) -> Vec<bool> {
         let mut contact = vec![false; self.problem.order()];
         let pressed = || {
-            self.shares_boundary()
+            shares_boundary(self.problem)
                 && self.interior.iter().all(|j| {
                     let free = |i: usize| system.loads[i][j] / system.matrices[i].diagonal(j);
                     if system.is_pair() {
@@ -213,30 +215,13 @@ impl<'a> Level<'a> {
         contact
     }
 
-    /// Whether the two heights are equal on the whole boundary.
-    fn shares_boundary(&self) -> bool {
-        let [g1, g2] = &self.problem.heights;
-        (0..self.problem.order()).all(|j| !self.problem.boundary[j] || g1[j] == g2[j])
-    }
-
-    /// What the contact set found says about the model: without contact, or with nothing else, no inequality was left.
-    pub fn named(&self, contact: &[bool], model: Reduction) -> Reduction {
-        if !contact.contains(&true) {
-            Reduction::NoContact
-        } else if self.interior.iter().all(|j| contact[j]) && self.shares_boundary() {
-            Reduction::FullContact
-        } else {
-            model
-        }
-    }
-
     /// z on the contact set, from the row of the softer membrane; 0 elsewhere, and where it is not positive beyond rounding.
     fn forces(&self, displacement: &[Vec<f64>; 2], contact: &[bool]) -> Vec<f64> {
         let problem = self.problem;
         let mut force = vec![0.0; problem.order()];
         for j in self.interior.iter().filter(|&j| contact[j]) {
             let i = usize::from(problem.diagonal(1, j) < problem.diagonal(0, j));
-            let (matrix, load) = (&problem.stiffness[i], problem.loads[i].nodal[j]);
+            let (matrix, load) = (problem.stiffness(i), problem.loads[i].nodal[j]);
             let residual = load - matrix.row_dot(j, &displacement[i]);
             let z = if i == 0 { -residual } else { residual };
             let terms = load.abs() + matrix.row_dot_abs(j, &displacement[i]);
@@ -250,7 +235,7 @@ impl<'a> Level<'a> {
     /// The Riesz representative: K sigma = z, zero on the boundary.
     pub fn sigma(&mut self, force: &[f64]) -> Result<Vec<f64>, SolveError> {
         let mut factor = self.take_scalar()?;
-        factor.whole(&self.problem.laplacian, Role::Laplacian, &self.interior)?;
+        factor.whole(self.problem.laplacian(), Role::Laplacian, &self.interior)?;
         let mut rhs: Vec<f64> = self.interior.iter().map(|j| force[j]).collect();
         factor.solve(&mut rhs);
         self.scalar = Some(factor);
@@ -259,6 +244,25 @@ impl<'a> Level<'a> {
             sigma[j] = value;
         }
         finite("sigma", sigma)
+    }
+}
+
+/// Whether the two heights are equal on the whole boundary.
+fn shares_boundary(problem: &DiscreteProblem) -> bool {
+    let [g1, g2] = &problem.heights;
+    let boundary = problem.boundary();
+    (0..problem.order()).all(|j| !boundary[j] || g1[j] == g2[j])
+}
+
+/// What the contact set found says about the model: without contact, or with nothing else, no inequality was left.
+pub(crate) fn named(problem: &DiscreteProblem, contact: &[bool], model: Reduction) -> Reduction {
+    let boundary = problem.boundary();
+    if !contact.contains(&true) {
+        Reduction::NoContact
+    } else if contact.iter().zip(boundary).all(|(&c, &b)| c || b) && shares_boundary(problem) {
+        Reduction::FullContact
+    } else {
+        model
     }
 }
 
@@ -314,11 +318,12 @@ fn mean(
     start: Option<&Start>,
 ) -> Result<Vec<f64>, SolveError> {
     let mut mean = model.initial_mean(interior, start);
-    factor.whole(model.matrix, model.role, interior)?;
+    let matrix = model.matrix();
+    factor.whole(matrix, model.role, interior)?;
     for _ in 0..2 {
         let mut rhs: Vec<f64> = interior
             .iter()
-            .map(|j| model.mean_load(j) - model.matrix.row_dot(j, &mean))
+            .map(|j| model.mean_load(j) - matrix.row_dot(j, &mean))
             .collect();
         factor.solve(&mut rhs);
         for (step, j) in rhs.iter().zip(interior.iter()) {

@@ -29,6 +29,7 @@ pub mod start;
 mod system;
 
 pub use error::SolveError;
+pub use multigrid::Workspace;
 pub use problem::{DiscreteProblem, Tensions};
 pub use settings::{Settings, Solver, Tolerance};
 pub use solution::{
@@ -36,6 +37,7 @@ pub use solution::{
 };
 pub use solve::{
     ACTIVE_SET_LIMIT, INTERIOR_POINT_LIMIT, MULTIGRID_FROM, ROUNDING_LIMIT, add_sigma, solve,
+    solve_in,
 };
 pub use start::Start;
 

@@ -1,10 +1,9 @@
 //! The discrete two-membrane problem on one mesh: matrices, loads, boundary heights.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use fem_core::assemble::{dual_areas, stiffness};
 use fem_core::integrate::Loads;
-use fem_core::topology::Birth;
 use fem_core::{Mesh, Pattern, SymmetricMatrix};
 
 /// What the two tensions have in common; decides how far the problem reduces.
@@ -22,68 +21,97 @@ pub enum Tensions {
 ///
 /// With the interior rows of `A_i u_i = F_i +- z`: `A_1 u1 - z = F_1`, `A_2 u2 + z = F_2`, `u1 - u2 >= 0`, `z >= 0`, `z . (u1
 /// - u2) = 0`. Every array that has one entry a vertex covers boundary vertices too; index 0 is the upper membrane.
+///
+/// Multigrid works on the mesh itself; the matrices in rows are assembled when somebody asks for them first.
 #[derive(Clone, Debug)]
 pub struct DiscreteProblem {
-    /// Sparsity pattern shared by all matrices.
-    pub pattern: Arc<Pattern>,
-    /// A_1, A_2: stiffness with the element means of the tensions.
-    pub stiffness: [SymmetricMatrix; 2],
-    /// K: stiffness with coefficient 1.
-    pub laplacian: SymmetricMatrix,
+    /// The mesh.
+    pub mesh: Arc<Mesh>,
     /// Element means of the tensions, one entry a triangle.
     pub tension_mean: [Vec<f64>; 2],
     /// What the tensions have in common.
     pub tensions: Tensions,
     /// Load vectors and element means.
     pub loads: [Loads; 2],
-    /// Whether a vertex lies on the boundary, where the displacements are given.
-    pub boundary: Vec<bool>,
     /// Heights at boundary vertices; 0 inside.
     pub heights: [Vec<f64>; 2],
     /// Area |D_j| of every vertex's dual cell.
     pub dual_area: Vec<f64>,
-    /// The birth of every vertex: the hierarchy of multigrid.
-    pub genealogy: Arc<[Birth]>,
-    /// The vertices in the order in which the leaves of the mesh touch them first: neighbours stand close.
-    pub along_leaves: Arc<[u32]>,
+    matrices: OnceLock<Matrices>,
+}
+
+/// The matrices of a problem in rows.
+#[derive(Clone, Debug)]
+struct Matrices {
+    pattern: Arc<Pattern>,
+    stiffness: [SymmetricMatrix; 2],
+    laplacian: SymmetricMatrix,
 }
 
 impl DiscreteProblem {
-    /// Assembles the matrices of a mesh; O(N).
+    /// The discrete problem on a mesh; O(N).
     ///
     /// `tension_mean` holds one positive value a triangle and membrane, `heights` one a vertex with `heights[0] >= heights[1]`.
     pub fn new(
-        mesh: &Mesh,
+        mesh: impl Into<Arc<Mesh>>,
         tension_mean: [Vec<f64>; 2],
         loads: [Loads; 2],
         heights: [Vec<f64>; 2],
     ) -> DiscreteProblem {
-        let pattern = Arc::new(Pattern::of(mesh));
-        let matrix = |i: usize| stiffness(mesh, &pattern, |t| tension_mean[i][t]);
+        let mesh = mesh.into();
         DiscreteProblem {
-            stiffness: [matrix(0), matrix(1)],
-            laplacian: stiffness(mesh, &pattern, |_| 1.0),
             tensions: Tensions::of(&tension_mean),
             tension_mean,
             loads,
-            boundary: mesh.boundary().to_vec(),
             heights,
-            dual_area: dual_areas(mesh),
-            genealogy: mesh.genealogy().into(),
-            along_leaves: along_leaves(mesh),
-            pattern,
+            dual_area: dual_areas(&mesh),
+            mesh,
+            matrices: OnceLock::new(),
         }
+    }
+
+    fn matrices(&self) -> &Matrices {
+        self.matrices.get_or_init(|| {
+            let mesh = &*self.mesh;
+            let pattern = Arc::new(Pattern::of(mesh));
+            let matrix = |i: usize| stiffness(mesh, &pattern, |t| self.tension_mean[i][t]);
+            Matrices {
+                stiffness: [matrix(0), matrix(1)],
+                laplacian: stiffness(mesh, &pattern, |_| 1.0),
+                pattern,
+            }
+        })
+    }
+
+    /// Sparsity pattern shared by all matrices.
+    pub fn pattern(&self) -> &Arc<Pattern> {
+        &self.matrices().pattern
+    }
+
+    /// A_1 or A_2: stiffness with the element means of a tension.
+    pub fn stiffness(&self, membrane: usize) -> &SymmetricMatrix {
+        &self.matrices().stiffness[membrane]
+    }
+
+    /// K: stiffness with coefficient 1.
+    pub fn laplacian(&self) -> &SymmetricMatrix {
+        &self.matrices().laplacian
+    }
+
+    /// Whether a vertex lies on the boundary, where the displacements are given.
+    pub fn boundary(&self) -> &[bool] {
+        self.mesh.boundary()
     }
 
     /// Number of vertices, boundary included.
     pub fn order(&self) -> usize {
-        self.boundary.len()
+        self.mesh.vertex_count()
     }
 
     /// d_ij = (A_i)_jj.
     #[inline]
     pub fn diagonal(&self, membrane: usize, vertex: usize) -> f64 {
-        self.stiffness[membrane].diagonal(vertex)
+        self.stiffness(membrane).diagonal(vertex)
     }
 
     /// d_j = d_1j d_2j / (d_1j + d_2j), written so that it cannot overflow.
@@ -92,18 +120,6 @@ impl DiscreteProblem {
         let (d1, d2) = (self.diagonal(0, vertex), self.diagonal(1, vertex));
         d1 / (1.0 + d1 / d2)
     }
-}
-
-/// The vertices of a mesh in the order of its triangles.
-fn along_leaves(mesh: &Mesh) -> Arc<[u32]> {
-    let mut seen = vec![false; mesh.vertex_count()];
-    let mut order = Vec::with_capacity(mesh.vertex_count());
-    for v in mesh.triangles().iter().flatten() {
-        if !std::mem::replace(&mut seen[v.index()], true) {
-            order.push(v.0);
-        }
-    }
-    order.into()
 }
 
 impl Tensions {

@@ -19,8 +19,6 @@ const CANCELLED: f64 = 8.0 * f64::EPSILON;
 /// Tensions in a constant ratio: the two displacements decouple into mean and gap.
 pub(crate) struct Proportional<'a> {
     problem: &'a DiscreteProblem,
-    /// M.
-    pub matrix: &'a SymmetricMatrix,
     /// What M stands for.
     pub role: Role,
     /// Name of the model.
@@ -31,28 +29,36 @@ pub(crate) struct Proportional<'a> {
 impl<'a> Proportional<'a> {
     /// The reduced model, where the tensions allow one.
     pub fn of(problem: &'a DiscreteProblem) -> Option<Self> {
-        let (matrix, role, reduction, tension) = match problem.tensions {
-            Tensions::Constant(m1, m2) => (
-                &problem.laplacian,
-                Role::Laplacian,
-                Reduction::ConstantTensions,
-                [m1, m2],
-            ),
-            Tensions::Ratio(c) => (
-                &problem.stiffness[0],
-                Role::Stiffness,
-                Reduction::ConstantRatio,
-                [1.0, c],
-            ),
+        let (role, reduction, tension) = match problem.tensions {
+            Tensions::Constant(m1, m2) => (Role::Laplacian, Reduction::ConstantTensions, [m1, m2]),
+            Tensions::Ratio(c) => (Role::Stiffness, Reduction::ConstantRatio, [1.0, c]),
             Tensions::General => return None,
         };
         Some(Proportional {
             problem,
-            matrix,
             role,
             reduction,
             tension,
         })
+    }
+
+    /// M in rows.
+    pub fn matrix(&self) -> &'a SymmetricMatrix {
+        match self.role {
+            Role::Laplacian => self.problem.laplacian(),
+            Role::Stiffness => self.problem.stiffness(0),
+        }
+    }
+
+    /// t_1, t_2.
+    pub fn tension(&self) -> [f64; 2] {
+        self.tension
+    }
+
+    /// The mean s of two displacements.
+    pub fn mean_of(&self, u: [f64; 2]) -> f64 {
+        let [s1, s2] = self.shares();
+        s1 * u[0] + s2 * u[1]
     }
 
     /// theta_1, theta_2: the share of either membrane in the tension.
@@ -72,23 +78,33 @@ impl<'a> Proportional<'a> {
     where
         'a: 's,
     {
-        let [t1, t2] = self.tension;
-        let [f1, f2] = [0, 1].map(|i| &self.problem.loads[i].nodal);
-        let mut load = vec![0.0; f1.len()];
+        let mut load = vec![0.0; self.problem.order()];
         let mut scale = load.clone();
         for j in interior.iter() {
-            let (a, b) = (f1[j] / t1, f2[j] / t2);
-            scale[j] = a.abs() + b.abs();
-            let difference = a - b;
-            if difference.abs() > CANCELLED * scale[j] {
-                load[j] = difference;
-            }
+            (load[j], scale[j]) = self.gap_load(j);
         }
         System {
-            matrices: vec![self.matrix],
+            matrices: vec![self.matrix()],
             loads: vec![load],
             load_scale: vec![scale],
             interior,
+        }
+    }
+
+    /// The load of the gap, F_1/t_1 - F_2/t_2, and the sum of the magnitudes that it was computed from.
+    #[inline]
+    pub fn gap_load(&self, j: usize) -> (f64, f64) {
+        let [t1, t2] = self.tension;
+        let [a, b] = [
+            self.problem.loads[0].nodal[j] / t1,
+            self.problem.loads[1].nodal[j] / t2,
+        ];
+        let scale = a.abs() + b.abs();
+        let difference = a - b;
+        if difference.abs() > CANCELLED * scale {
+            (difference, scale)
+        } else {
+            (0.0, scale)
         }
     }
 
@@ -106,8 +122,7 @@ impl<'a> Proportional<'a> {
 
     /// The mean to start from: boundary values of the problem, else the start's or zero.
     pub fn initial_mean(&self, interior: &Interior, start: Option<&Start>) -> Vec<f64> {
-        let [s1, s2] = self.shares();
-        let mean = |u: &[Vec<f64>; 2], j: usize| s1 * u[0][j] + s2 * u[1][j];
+        let mean = |u: &[Vec<f64>; 2], j: usize| self.mean_of([u[0][j], u[1][j]]);
         let mut values: Vec<f64> = (0..self.problem.order())
             .map(|j| mean(&self.problem.heights, j))
             .collect();
@@ -127,24 +142,34 @@ impl<'a> Proportional<'a> {
 
     /// Turns multipliers y of the gap into action forces z.
     pub fn forces(&self, multiplier: &mut [f64]) {
-        let [t1, t2] = self.tension;
-        let harmonic = t1 / (1.0 + t1 / t2);
         for y in multiplier {
-            *y *= harmonic;
+            *y = self.force(*y);
         }
     }
 
+    /// The action force of a multiplier of the gap.
+    #[inline]
+    pub fn force(&self, multiplier: f64) -> f64 {
+        let [t1, t2] = self.tension;
+        multiplier * (t1 / (1.0 + t1 / t2))
+    }
+
     /// The displacements from mean and gap; the heights on the boundary.
-    ///
-    /// Rounding is monotone, so a gap that is not negative stays so, and a closed one closed.
-    pub fn displacements(&self, interior: &Interior, mean: &[f64], gap: &[f64]) -> [Vec<f64>; 2] {
-        let [s1, s2] = self.shares();
+    pub fn fields(&self, interior: &Interior, mean: &[f64], gap: &[f64]) -> [Vec<f64>; 2] {
         let mut u = self.problem.heights.clone();
         for j in interior.iter() {
-            u[0][j] = mean[j] + s2 * gap[j];
-            u[1][j] = mean[j] - s1 * gap[j];
+            [u[0][j], u[1][j]] = self.displacements(mean[j], gap[j]);
         }
         u
+    }
+
+    /// The displacements of a vertex from its mean and gap.
+    ///
+    /// Rounding is monotone, so a gap that is not negative stays so, and a closed one closed.
+    #[inline]
+    pub fn displacements(&self, mean: f64, gap: f64) -> [f64; 2] {
+        let [s1, s2] = self.shares();
+        [mean + s2 * gap, mean - s1 * gap]
     }
 }
 
@@ -152,7 +177,7 @@ impl<'a> Proportional<'a> {
 pub(crate) fn pair_system<'a>(problem: &'a DiscreteProblem, interior: &'a Interior) -> System<'a> {
     let loads: Vec<Vec<f64>> = problem.loads.iter().map(|l| l.nodal.clone()).collect();
     System {
-        matrices: problem.stiffness.iter().collect(),
+        matrices: vec![problem.stiffness(0), problem.stiffness(1)],
         load_scale: loads
             .iter()
             .map(|l| l.iter().map(|f| f.abs()).collect())

@@ -81,7 +81,8 @@ pub struct Solution {
     pub displacement: [Vec<f64>; 2],
     /// Action forces z_j = <lambda_h, phi_j> >= 0; 0 on the boundary.
     pub force: Vec<f64>,
-    /// Riesz representative sigma_h of the action: K sigma = z (4.1), (5.4); 0 on the boundary.
+    /// Riesz representative sigma_h of the action: K sigma = z (4.1), (5.4); 0 on the boundary. Empty where it was left out
+    /// ([`Settings::sigma`](crate::Settings::sigma)).
     pub sigma: Vec<f64>,
     /// The contact set: interior vertices of the active set.
     pub contact: Vec<bool>,
@@ -111,10 +112,10 @@ fn displacement_unit(displacement: &[Vec<f64>; 2]) -> f64 {
 pub fn kkt_residual(problem: &DiscreteProblem, displacement: &[Vec<f64>; 2], force: &[f64]) -> f64 {
     let unit = displacement_unit(displacement);
     let mut worst = 0.0f64;
-    for j in (0..problem.order()).filter(|&j| !problem.boundary[j]) {
+    for j in (0..problem.order()).filter(|&j| !problem.boundary()[j]) {
         for (i, sign) in [(0, 1.0), (1, -1.0)] {
             let rest = problem.loads[i].nodal[j] + sign * force[j]
-                - problem.stiffness[i].row_dot(j, &displacement[i]);
+                - problem.stiffness(i).row_dot(j, &displacement[i]);
             worst = worst.max(rest.abs() / problem.diagonal(i, j) / unit);
         }
         let gap = displacement[0][j] - displacement[1][j];
@@ -144,9 +145,9 @@ pub fn rounding_residual(
 ) -> f64 {
     let unit = displacement_unit(displacement);
     let mut worst = 0.0f64;
-    for j in (0..problem.order()).filter(|&j| !problem.boundary[j]) {
+    for j in (0..problem.order()).filter(|&j| !problem.boundary()[j]) {
         for i in 0..2 {
-            let terms = problem.stiffness[i].row_dot_abs(j, &displacement[i])
+            let terms = problem.stiffness(i).row_dot_abs(j, &displacement[i])
                 + problem.loads[i].nodal[j].abs()
                 + force[j];
             worst = worst.max(terms / problem.diagonal(i, j) / unit);

@@ -2,7 +2,7 @@
 
 use crate::error::SolveError;
 use crate::level::{INTERIOR_POINT, Level, Method};
-use crate::multigrid;
+use crate::multigrid::{self, Workspace};
 use crate::problem::DiscreteProblem;
 use crate::settings::{Settings, Solver, Tolerance};
 use crate::solution::{Solution, Status, rounding_residual};
@@ -63,18 +63,32 @@ pub fn solve(
     settings: &Settings,
     start: Option<&Start>,
 ) -> Result<Solution, SolveError> {
+    solve_in(problem, settings, start, &mut Workspace::default())
+}
+
+/// As [`solve`], with the memory of the solves before it. The result does not depend on what the workspace was used for.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_in(
+    problem: &DiscreteProblem,
+    settings: &Settings,
+    start: Option<&Start>,
+    workspace: &mut Workspace,
+) -> Result<Solution, SolveError> {
     check(problem, start)?;
-    let mut level = Level::new(problem, settings);
+    let direct = |method: Method| Level::new(problem, settings).solve(method, start);
     // Without an interior vertex there is nothing to iterate on.
-    let trivial = !problem.boundary.contains(&false);
+    let trivial = !problem.boundary().contains(&false);
     let solution = match settings.solver {
-        Solver::Clarabel if !trivial => level.solve(Method::InteriorPoint, start)?,
-        Solver::Clarabel | Solver::ActiveSet => level.solve(Method::ActiveSet, start)?,
-        Solver::Multigrid => by_multigrid(&mut level, settings, start)?,
+        Solver::Clarabel if !trivial => direct(Method::InteriorPoint)?,
+        Solver::Clarabel | Solver::ActiveSet => direct(Method::ActiveSet)?,
+        Solver::Multigrid => by_multigrid(problem, settings, start, workspace)?,
         Solver::Auto if problem.order() >= MULTIGRID_FROM => {
-            by_multigrid(&mut level, settings, start)?
+            by_multigrid(problem, settings, start, workspace)?
         }
         Solver::Auto => {
+            let mut level = Level::new(problem, settings);
             let first = level.solve(Method::ActiveSet, start)?;
             if first.info.status == Status::Converged {
                 first
@@ -94,38 +108,39 @@ pub fn add_sigma(
     problem: &DiscreteProblem,
     settings: &Settings,
     solution: &mut Solution,
+    workspace: &mut Workspace,
 ) -> Result<(), SolveError> {
-    let mut level = Level::new(problem, settings);
     let iterative = match settings.solver {
         Solver::Multigrid => true,
         Solver::Auto => problem.order() >= MULTIGRID_FROM,
         Solver::ActiveSet | Solver::Clarabel => false,
     };
     let found = if iterative {
-        multigrid::sigma(&level, settings, &solution.force).unwrap_or_default()
+        multigrid::sigma(problem, settings, &solution.force, workspace).unwrap_or_default()
     } else {
         None
     };
     solution.sigma = match found {
         Some(sigma) => sigma,
         None if solution.force.iter().all(|&z| z == 0.0) => vec![0.0; problem.order()],
-        None => level.sigma(&solution.force)?,
+        None => Level::new(problem, settings).sigma(&solution.force)?,
     };
     Ok(())
 }
 
 /// Multigrid where there is a hierarchy, and the active set method from its last iterate should it miss its goal.
 fn by_multigrid(
-    level: &mut Level,
+    problem: &DiscreteProblem,
     settings: &Settings,
     start: Option<&Start>,
+    workspace: &mut Workspace,
 ) -> Result<Solution, SolveError> {
     let mut cycles = None;
-    let again = match multigrid::solve(level, settings, start) {
-        Ok(None) => return level.solve(Method::ActiveSet, start),
-        Ok(Some(mut solution)) if meets(level.problem, &solution, settings) => {
-            if solution.sigma.is_empty() {
-                solution.sigma = level.sigma(&solution.force)?;
+    let again = match multigrid::solve(problem, settings, start, workspace) {
+        Ok(None) => return Level::new(problem, settings).solve(Method::ActiveSet, start),
+        Ok(Some(mut solution)) if meets(problem, &solution, settings) => {
+            if settings.sigma && solution.sigma.is_empty() {
+                solution.sigma = Level::new(problem, settings).sigma(&solution.force)?;
             }
             return Ok(solution);
         }
@@ -141,6 +156,7 @@ fn by_multigrid(
         // The factor of the initial mesh failed: let the whole matrix say so, or not.
         Err(_) => None,
     };
+    let mut level = Level::new(problem, settings);
     let mut solution = level.solve(Method::ActiveSet, again.as_ref().or(start))?;
     solution.info.cycles = cycles;
     solution.info.solver = match solution.info.solver {
@@ -206,20 +222,19 @@ fn judge(
     })
 }
 
-/// The relative KKT residual that a solution must reach.
+/// The relative KKT residual that a solution must reach: the tolerance of its method, or what rounding allows where that is more and
+/// the tolerance was left to the method.
 fn limit(problem: &DiscreteProblem, solution: &Solution, tolerance: Tolerance) -> f64 {
-    match tolerance {
-        Tolerance::Relative(t) => t,
-        Tolerance::Balanced => {
-            let limit = if solution.info.solver == INTERIOR_POINT {
-                INTERIOR_POINT_LIMIT
-            } else {
-                ACTIVE_SET_LIMIT
-            };
-            let rounding = rounding_residual(problem, &solution.displacement, &solution.force);
-            limit.max(rounding.min(ROUNDING_LIMIT))
-        }
+    let limit = match tolerance {
+        Tolerance::Relative(t) => return t,
+        Tolerance::Balanced if solution.info.solver == INTERIOR_POINT => INTERIOR_POINT_LIMIT,
+        Tolerance::Balanced => ACTIVE_SET_LIMIT,
+    };
+    if solution.info.kkt_residual <= limit {
+        return limit;
     }
+    let rounding = rounding_residual(problem, &solution.displacement, &solution.force);
+    limit.max(rounding.min(ROUNDING_LIMIT))
 }
 
 fn check(problem: &DiscreteProblem, start: Option<&Start>) -> Result<(), SolveError> {
@@ -261,7 +276,7 @@ fn check(problem: &DiscreteProblem, start: Option<&Start>) -> Result<(), SolveEr
         });
     }
     let [g1, g2] = &problem.heights;
-    match (0..expected).find(|&j| problem.boundary[j] && g1[j] < g2[j]) {
+    match (0..expected).find(|&j| problem.boundary()[j] && g1[j] < g2[j]) {
         Some(vertex) => Err(SolveError::HeightsCross {
             vertex,
             upper: g1[vertex],

@@ -30,30 +30,31 @@ impl Start {
     pub fn prolong(solution: &Solution, mesh: &Mesh, old_vertices: usize) -> Start {
         let vertices = mesh.vertex_count();
         let boundary = mesh.boundary();
-        let mut displacement = solution.displacement.clone();
-        let mut contact = solution.contact.clone();
-        let mut sigma = solution.sigma.clone();
-        for field in displacement.iter_mut().chain([&mut sigma]) {
-            field.reserve_exact(vertices.saturating_sub(old_vertices));
-        }
-        for birth in mesh.genealogy().iter().skip(old_vertices) {
-            let [a, b] = birth.parents.map(|p| p.index());
-            for field in displacement.iter_mut().chain([&mut sigma]) {
-                let mean = 0.5 * field[a] + 0.5 * field[b];
-                field.push(mean);
+        let births = &mesh.genealogy()[old_vertices..];
+        let carried = |field: &[f64]| -> Vec<f64> {
+            let mut values = Vec::with_capacity(vertices);
+            values.extend_from_slice(field);
+            for birth in births {
+                let [a, b] = birth.parents.map(|p| p.index());
+                values.push(0.5 * values[a] + 0.5 * values[b]);
             }
-            let touches =
-                |p: usize| contact[p] || boundary[p] && displacement[0][p] == displacement[1][p];
-            let both = touches(a) && touches(b);
-            contact.push(both);
+            values
+        };
+        let [u1, u2] = [0, 1].map(|i| carried(&solution.displacement[i]));
+        let mut contact = Vec::with_capacity(vertices);
+        contact.extend_from_slice(&solution.contact);
+        for birth in births {
+            let touches = |p: usize| contact[p] || boundary[p] && u1[p] == u2[p];
+            let [a, b] = birth.parents.map(|p| p.index());
+            contact.push(touches(a) && touches(b));
         }
         for (touching, &fixed) in contact.iter_mut().zip(boundary) {
             *touching &= !fixed;
         }
         Start {
-            displacement,
+            displacement: [u1, u2],
             force: None,
-            sigma: Some(sigma),
+            sigma: (!solution.sigma.is_empty()).then(|| carried(&solution.sigma)),
             first_cycle: solution.info.first_cycle,
             contact,
         }
@@ -64,7 +65,7 @@ impl Start {
         Start {
             displacement: solution.displacement.clone(),
             force: Some(solution.force.clone()),
-            sigma: Some(solution.sigma.clone()),
+            sigma: Some(solution.sigma.clone()).filter(|sigma| !sigma.is_empty()),
             first_cycle: solution.info.first_cycle,
             contact: solution.contact.clone(),
         }

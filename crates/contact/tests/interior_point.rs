@@ -35,7 +35,7 @@ fn assert_witness(problem: &DiscreteProblem) {
             assert!(!c.contact[j] || c.gap(j) == 0.0);
             assert!(c.contact[j] || c.force[j] == 0.0);
             assert!((a.sigma[j] - c.sigma[j]).abs() <= 1e-5 * largest.max(u));
-            if problem.boundary[j] {
+            if problem.boundary()[j] {
                 continue;
             }
             let clear = (a.gap(j) / u).max(a.force[j] / problem.harmonic_diagonal(j) / u);

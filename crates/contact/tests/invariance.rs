@@ -155,7 +155,7 @@ fn senseless_data_are_refused_by_name() {
     };
     let fine = data.on(&square(6));
     let n = fine.order();
-    let inside = fine.boundary.iter().position(|b| !b).unwrap();
+    let inside = fine.boundary().iter().position(|b| !b).unwrap();
     let fails = |problem: &DiscreteProblem, start: Option<&Start>| {
         solve(problem, &Settings::default(), start).unwrap_err()
     };
@@ -204,7 +204,7 @@ fn senseless_data_are_refused_by_name() {
     };
     assert!(matches!(
         fails(&bad.on(&square(6)), None),
-        SolveError::NotPositiveDefinite { vertex } if !fine.boundary[vertex]
+        SolveError::NotPositiveDefinite { vertex } if !fine.boundary()[vertex]
     ));
     let text = fails(&bad.on(&square(6)), None).to_string();
     assert!(text.contains("not positive definite"), "{text}");

@@ -185,13 +185,13 @@ fn full_contact_is_one_solve_with_the_sum_of_the_matrices() {
         assert_eq!((s.info.iterations, s.info.unknowns), (1, 19 * 19));
         assert!(s.info.kkt_residual <= 1e-14);
         for j in 0..problem.order() {
-            assert_eq!(s.contact[j], !problem.boundary[j]);
+            assert_eq!(s.contact[j], !problem.boundary()[j]);
             if s.contact[j] {
                 assert!(s.force[j] > 0.0);
                 let sum: f64 = (0..2)
                     .map(|i| {
                         problem.loads[i].nodal[j]
-                            - problem.stiffness[i].row_dot(j, &s.displacement[i])
+                            - problem.stiffness(i).row_dot(j, &s.displacement[i])
                     })
                     .sum();
                 assert!(sum.abs() < 1e-13, "{sum:e}");
@@ -231,9 +231,10 @@ fn contact_that_reaches_the_boundary() {
         assert!(s.info.kkt_residual <= 1e-12);
         let neighbour = (0..problem.order()).any(|j| {
             s.contact[j]
-                && problem.stiffness[0]
+                && problem
+                    .stiffness(0)
                     .row(j)
-                    .any(|(k, _)| problem.boundary[k])
+                    .any(|(k, _)| problem.boundary()[k])
         });
         assert!(neighbour, "contact stays away from the boundary");
         assert!(difference(&s, &solved(&problem, false)) <= 1e-12);
@@ -355,7 +356,7 @@ fn one_interior_vertex_is_solved_by_hand() {
         heights: [&|_, _| 0.25, ZERO],
     };
     let problem = data.on(&mesh);
-    let centre = problem.boundary.iter().position(|b| !b).unwrap();
+    let centre = problem.boundary().iter().position(|b| !b).unwrap();
     let (d1, d2) = (problem.diagonal(0, centre), problem.diagonal(1, centre));
     let (f1, f2) = (
         problem.loads[0].nodal[centre] + d1 * 0.25,

@@ -44,7 +44,7 @@ pub struct Defect {
 pub fn finite_volume(problem: &DiscreteProblem, solution: &Solution) -> FiniteVolume {
     let forces = solution.force.iter().zip(&problem.dual_area);
     let action = forces
-        .zip(&problem.boundary)
+        .zip(problem.boundary())
         .map(|((z, area), boundary)| if *boundary { 0.0 } else { z / area })
         .collect();
     FiniteVolume { action }
@@ -91,7 +91,7 @@ impl FiniteVolume {
             action: 0.0,
             complementarity: 0.0,
         };
-        for j in (0..n).filter(|&j| !problem.boundary[j]) {
+        for j in (0..n).filter(|&j| !problem.boundary()[j]) {
             let l = self.action[j];
             for (i, sign) in [(0, 1.0), (1, -1.0)] {
                 let rest = problem.loads[i].nodal[j] + sign * l * cell[j] - form[i][j];

@@ -32,7 +32,7 @@ pub(crate) fn problem(mesh: &Mesh, tension: [Vec<f64>; 2], load: [f64; 2]) -> Di
         deviation_squared: vec![0.0; mesh.triangle_count()],
     });
     let heights = [vec![0.0; area.len()], vec![0.0; area.len()]];
-    DiscreteProblem::new(mesh, tension, loads, heights)
+    DiscreteProblem::new(mesh.clone(), tension, loads, heights)
 }
 
 /// A solution with these nodal values.

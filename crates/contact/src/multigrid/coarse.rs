@@ -1,5 +1,7 @@
 //! The initial mesh, however large: a sparse Cholesky factor of its truncated matrix.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
+
 use super::hierarchy::Hierarchy;
 use super::unknowns::{EMPTY, Unknowns};
 use crate::cholesky::{Cholesky, FactorError, Lower};
@@ -26,6 +28,7 @@ enum Source {
 }
 
 /// Exact solutions on the initial mesh.
+#[derive(Default)]
 pub(crate) struct MacroSolver<U: Unknowns> {
     /// Inner vertices of the initial mesh, in order.
     pub inner: Vec<u32>,
@@ -40,13 +43,26 @@ pub(crate) struct MacroSolver<U: Unknowns> {
     factored: Vec<f64>,
     rhs: Vec<f64>,
     always: bool,
-    /// Numeric factorisations so far.
+    /// Numeric factorisations since it was fitted last.
     pub factorisations: usize,
+    /// What it was made for: the edges of the initial mesh and its boundary, as far as a hash tells.
+    fingerprint: Option<u64>,
 }
 
 impl<U: Unknowns> MacroSolver<U> {
+    /// Takes in the initial mesh of a hierarchy; pattern, analysis and factor are kept while that is the same.
+    pub fn fit(&mut self, hierarchy: &Hierarchy) {
+        let fingerprint = fingerprint(hierarchy);
+        if self.fingerprint != Some(fingerprint) {
+            *self = MacroSolver::new(hierarchy);
+            self.fingerprint = Some(fingerprint);
+        }
+        self.always = self.inner.len() * SMALL <= hierarchy.len();
+        self.factorisations = 0;
+    }
+
     /// The pattern; it is analysed when it is factored first.
-    pub fn new(hierarchy: &Hierarchy) -> MacroSolver<U> {
+    fn new(hierarchy: &Hierarchy) -> MacroSolver<U> {
         let n0 = hierarchy.initial();
         let inner: Vec<u32> = (0..n0 as u32)
             .filter(|&x| !hierarchy.fixed[x as usize])
@@ -105,13 +121,14 @@ impl<U: Unknowns> MacroSolver<U> {
             larger,
             larger_start,
             rhs: vec![0.0; w * inner.len()],
-            always: inner.len() * SMALL <= hierarchy.len(),
+            always: false,
             inner,
             lower,
             source,
             cholesky: None,
             factored: Vec::new(),
             factorisations: 0,
+            fingerprint: None,
         }
     }
 
@@ -226,4 +243,14 @@ impl<U: Unknowns> MacroSolver<U> {
             }
         }
     }
+}
+
+/// A hash of the edges of the initial mesh and of its boundary.
+fn fingerprint(hierarchy: &Hierarchy) -> u64 {
+    let mut hash = DefaultHasher::new();
+    let n0 = hierarchy.initial();
+    hierarchy.macro_start.hash(&mut hash);
+    hierarchy.macro_end.hash(&mut hash);
+    hierarchy.fixed[..n0].hash(&mut hash);
+    hash.finish()
 }

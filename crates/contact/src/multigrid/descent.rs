@@ -13,11 +13,10 @@
 //! an earlier mesh stands in, and where that is not good enough, or not known, at least three steps are made, and more until their gains have
 //! died away: slow parts of the error, as jumps of the tension or slivers make them, show only after the quick ones have gone.
 
-use fem_core::SymmetricMatrix;
-
 use super::finest::Finest;
 use super::galerkin::Levels;
 use super::hierarchy::Hierarchy;
+use super::row_magnitude;
 use super::unknowns::Unknowns;
 use crate::error::SolveError;
 use crate::solution::Status;
@@ -120,8 +119,6 @@ pub(crate) struct Descent<'a, U: Unknowns> {
     pub hierarchy: &'a Hierarchy,
     pub finest: &'a Finest<U>,
     pub levels: &'a mut Levels<U>,
-    /// The matrices in the order of the mesh, for single rows.
-    pub matrices: &'a [&'a SymmetricMatrix],
     /// Whether the gap must not be negative; else the problem is linear.
     pub inequality: bool,
     /// Sum of the magnitudes that the load of a rank was computed from.
@@ -164,25 +161,16 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         hierarchy: &'a Hierarchy,
         finest: &'a Finest<U>,
         levels: &'a mut Levels<U>,
-        matrices: &'a [&'a SymmetricMatrix],
         inequality: bool,
         load_scale: &'a dyn Fn(usize) -> f64,
         values: Vectors<U>,
     ) -> Descent<'a, U> {
         let n = hierarchy.len();
-        let mut zeros = || match levels.spare.pop() {
-            Some(mut old) => {
-                old.fill(U::Value::default());
-                old
-            }
-            None => vec![U::Value::default(); n],
-        };
-        let [r, scratch, correction, direction, image] = [(); 5].map(|()| zeros());
+        let [r, scratch, correction, direction, image] = [(); 5].map(|()| levels.vector(n));
         Descent {
             hierarchy,
             finest,
             levels,
-            matrices,
             inequality,
             load_scale,
             x: values.x,
@@ -295,17 +283,20 @@ impl<'a, U: Unknowns> Descent<'a, U> {
         }
     }
 
-    /// Gives the vectors back to the levels.
-    pub fn release(mut self) {
-        for vector in [
-            &mut self.r,
+    /// The iterate, its residual and the contact set; the other vectors go back to the levels.
+    pub fn release(mut self) -> (Vec<U::Value>, Vec<U::Value>, Vec<bool>) {
+        let spare = [
+            &mut self.b,
             &mut self.scratch,
             &mut self.correction,
             &mut self.direction,
             &mut self.image,
-        ] {
-            self.levels.spare.push(std::mem::take(vector));
+        ];
+        self.levels.spare.extend(spare.map(std::mem::take));
+        if !self.inequality {
+            self.levels.spare.push(std::mem::take(&mut self.r));
         }
+        (self.x, self.r, self.contact)
     }
 
     /// The residual computed afresh, and the contact set that belongs to it.
@@ -367,22 +358,12 @@ impl<'a, U: Unknowns> Descent<'a, U> {
 
     /// The least over the fields of `|A||x| + |load|` in a row: what its rounding errors are relative to.
     fn row_scale(&self, p: usize) -> f64 {
-        let j = self.hierarchy.vertex[p] as usize;
-        let pattern = self.matrices[0].pattern();
-        let scale = (self.load_scale)(p);
-        let sum = |i: usize| -> f64 {
-            let values = &self.matrices[i].values()[pattern.range(j)];
-            pattern
-                .columns(j)
-                .iter()
-                .zip(values)
-                .map(|(&k, a)| {
-                    let q = self.hierarchy.rank[k as usize] as usize;
-                    (a * U::at(self.x[q], i)).abs()
-                })
-                .sum()
-        };
-        (0..U::WIDTH).map(sum).fold(f64::INFINITY, f64::min) + scale
+        let sums = row_magnitude(self.hierarchy, self.finest, &self.x, p);
+        let least = sums[..U::WIDTH]
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        least + (self.load_scale)(p)
     }
 }
 

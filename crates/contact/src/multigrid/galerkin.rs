@@ -7,6 +7,7 @@ use super::unknowns::Unknowns;
 use crate::error::SolveError;
 
 /// Rows of every level that are smoothed there, and the solver of the initial mesh.
+#[derive(Default)]
 pub(crate) struct Levels<U: Unknowns> {
     /// After a sweep: of every vertex the couplings on the level that it belongs to.
     pub coupling: Vec<U::Coupling>,
@@ -27,22 +28,29 @@ pub(crate) struct Levels<U: Unknowns> {
 }
 
 impl<U: Unknowns> Levels<U> {
-    /// Memory for the matrices; no values yet.
-    pub fn new(hierarchy: &Hierarchy) -> Levels<U> {
+    /// Memory for the matrices of a hierarchy; no values yet.
+    pub fn fit(&mut self, hierarchy: &Hierarchy) {
         let rows = hierarchy.old_vertex.len();
-        Levels {
-            coupling: vec![U::Coupling::default(); hierarchy.slots()],
-            pivot: vec![U::Pivot::default(); hierarchy.len()],
-            old_coupling: vec![U::Coupling::default(); hierarchy.old_slot.len()],
-            old_pivot: vec![U::Pivot::default(); rows],
-            old_step: vec![U::Value::default(); rows],
-            old_residual: vec![U::Value::default(); rows],
-            spare: Vec::new(),
-            initial: MacroSolver::new(hierarchy),
-        }
+        self.coupling
+            .resize(hierarchy.slots(), U::Coupling::default());
+        self.pivot.resize(hierarchy.len(), U::Pivot::default());
+        let entries = hierarchy.old_slot.len();
+        self.old_coupling.resize(entries, U::Coupling::default());
+        self.old_pivot.resize(rows, U::Pivot::default());
+        self.old_step.resize(rows, U::Value::default());
+        self.old_residual.resize(rows, U::Value::default());
+        self.initial.fit(hierarchy);
     }
 
-    /// The matrices of all levels with the hat functions truncated on `contact`; O(N).
+    /// A vector of some length from the spare ones; its values are whatever they were.
+    pub fn vector(&mut self, len: usize) -> Vec<U::Value> {
+        let mut vector = self.spare.pop().unwrap_or_default();
+        vector.reserve_exact(len.saturating_sub(vector.len()));
+        vector.resize(len, U::Value::default());
+        vector
+    }
+
+    /// The matrices of all levels with the hat functions truncated on `contact`, which is empty for none; O(N).
     ///
     /// With c_p = (c_a + c_b)/2 for the vertex p that halved the edge ab, its couplings al, be, ga, de to a, b, c, d and its diagonal
     /// block pi, undoing the bisection means: aa += (al + al')/2 + pi/4, bb likewise, ab = (al' + be)/2 + pi/4, ac, bc += ga/2, ad,
@@ -99,7 +107,7 @@ impl<U: Unknowns> Levels<U> {
     /// The truncated matrix of the finest mesh.
     fn fill(&mut self, hierarchy: &Hierarchy, finest: &Finest<U>, contact: &[bool]) {
         let n0 = hierarchy.initial();
-        let free = !contact.contains(&true);
+        let free = contact.is_empty() || !contact.contains(&true);
         let glued = |q: usize| (!free && contact[q]).then(|| finest.share(q));
         for p in 0..hierarchy.len() {
             self.pivot[p] = if hierarchy.fixed[p] {

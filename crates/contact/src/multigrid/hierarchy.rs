@@ -10,9 +10,12 @@
 //! T_l are a prefix of every array. Every edge of every T_l was made together with its younger end p and joins it to one of a, b, c, d:
 //! it is slot 4 (p - n_0) + k of a flat array, n_0 the size of the initial mesh, whose own edges follow behind.
 
-use crate::problem::DiscreteProblem;
+use fem_core::{Mesh, Neighbour, VertexId};
 
 /// The order of elimination, the slots of all edges and the rows to be smoothed.
+///
+/// Its arrays are kept from one mesh to the next ([`Hierarchy::read`]): fresh memory costs more than what is written to it.
+#[derive(Default)]
 pub(crate) struct Hierarchy {
     /// Mesh vertex of every rank.
     pub vertex: Vec<u32>,
@@ -42,29 +45,34 @@ pub(crate) struct Hierarchy {
     pub old_column: Vec<u32>,
     /// Slot of every entry.
     pub old_slot: Vec<u32>,
+    /// The edges of every rank in the mesh itself.
+    pub rows: Rows,
+    /// Scratch: the level in which a vertex was listed as old last.
+    listed: Vec<u16>,
 }
 
 /// The rows of the mesh T_l while it grows: other end and slot of every edge.
-struct Rows {
+#[derive(Default)]
+pub(crate) struct Rows {
     start: Vec<u32>,
     end: Vec<u32>,
     entry: Vec<[u32; 2]>,
 }
 
 impl Rows {
-    fn new(problem: &DiscreteProblem, vertex: &[u32]) -> Rows {
-        let mut start = Vec::with_capacity(vertex.len());
+    /// Makes room for the edges of every rank, none of them there yet.
+    fn clear(&mut self, degree: &[u32], vertex: &[u32]) {
+        refill(&mut self.start, vertex.len(), 0);
         let mut total = 0u32;
-        for &j in vertex {
-            start.push(total);
+        for (start, &j) in self.start.iter_mut().zip(vertex) {
+            *start = total;
             // A vertex never loses an edge when the mesh is refined.
-            total += problem.pattern.range(j as usize).len() as u32 - 1;
+            total += degree[j as usize];
         }
-        Rows {
-            end: start.clone(),
-            start,
-            entry: vec![[0; 2]; total as usize],
-        }
+        self.end.clear();
+        self.end.extend_from_slice(&self.start);
+        // What is left from the mesh before is overwritten.
+        self.entry.resize(total as usize, [0; 2]);
     }
 
     #[inline]
@@ -79,8 +87,9 @@ impl Rows {
         &mut self.entry[self.start[x as usize] as usize..self.end[x as usize] as usize]
     }
 
+    /// The edges of a rank: other end and slot.
     #[inline]
-    fn row(&self, x: u32) -> &[[u32; 2]] {
+    pub fn row(&self, x: u32) -> &[[u32; 2]] {
         &self.entry[self.start[x as usize] as usize..self.end[x as usize] as usize]
     }
 
@@ -107,47 +116,45 @@ impl Rows {
     }
 }
 
+/// Gives a vector a length and one value everywhere, in the memory that it has if that is enough.
+pub(crate) fn refill<T: Clone>(vector: &mut Vec<T>, len: usize, value: T) {
+    vector.clear();
+    vector.reserve_exact(len);
+    vector.resize(len, value);
+}
+
 impl Hierarchy {
-    /// Reads the hierarchy off the births; O(N), no searching beyond the edges of a vertex.
-    pub fn new(problem: &DiscreteProblem) -> Hierarchy {
-        let (vertex, rank, level) = by_level(problem);
-        let n0 = level[1] as usize;
-        let fixed: Vec<bool> = vertex
-            .iter()
-            .map(|&j| problem.boundary[j as usize])
-            .collect();
-        let boundary = (0..fixed.len() as u32)
-            .filter(|&p| fixed[p as usize])
-            .collect();
-        let quad: Vec<[u32; 4]> = vertex[n0..]
-            .iter()
-            .map(|&j| {
-                let birth = &problem.genealogy[j as usize];
-                let [a, b] = birth.parents.map(|v| rank[v.index()]);
-                let c = rank[birth.opposite[0].index()];
-                let d = Some(birth.opposite[1]).filter(|d| d.is_some());
-                [a, b, c, d.map_or(c, |d| rank[d.index()])]
-            })
-            .collect();
-        let (macro_start, macro_end) = macro_edges(problem, &vertex, &rank, n0);
-        let mut hierarchy = Hierarchy {
-            around: Vec::with_capacity(quad.len()),
-            old_level: vec![0],
-            old_vertex: Vec::new(),
-            old_start: vec![0],
-            old_column: Vec::new(),
-            old_slot: Vec::new(),
-            vertex,
-            rank,
-            level,
-            fixed,
-            boundary,
-            quad,
-            macro_start,
-            macro_end,
-        };
-        hierarchy.grow(problem);
-        hierarchy
+    /// Reads the hierarchy of a mesh off its births; O(N), no searching beyond the edges of a vertex.
+    ///
+    /// `initial` is the order of the vertices of the initial mesh, where it is known; else they follow the leaves of this one.
+    pub fn read(&mut self, mesh: &Mesh, initial: Option<&[u32]>) {
+        let degree = self.number(mesh, initial);
+        let n0 = self.initial();
+        let boundary = mesh.boundary();
+        self.fixed.clear();
+        self.fixed
+            .extend(self.vertex.iter().map(|&j| boundary[j as usize]));
+        self.boundary.clear();
+        self.boundary
+            .extend((0..self.fixed.len() as u32).filter(|&p| self.fixed[p as usize]));
+        let births = mesh.genealogy();
+        let rank = &self.rank;
+        self.quad.clear();
+        self.quad.reserve_exact(self.vertex.len() - n0);
+        self.quad.extend(self.vertex[n0..].iter().map(|&j| {
+            let birth = &births[j as usize];
+            let [a, b] = birth.parents.map(|v| rank[v.index()]);
+            let c = rank[birth.opposite[0].index()];
+            let d = Some(birth.opposite[1]).filter(|d| d.is_some());
+            [a, b, c, d.map_or(c, |d| rank[d.index()])]
+        }));
+        self.macro_edges(mesh);
+        self.grow(&degree);
+    }
+
+    /// The order of the vertices of the initial mesh, for [`Hierarchy::read`] on the next mesh.
+    pub fn initial_order(&self) -> &[u32] {
+        &self.vertex[..self.initial()]
     }
 
     /// Number of vertices.
@@ -214,10 +221,20 @@ impl Hierarchy {
     }
 
     /// Bisects level by level, and notes the slots around every new vertex and the rows of its parents.
-    fn grow(&mut self, problem: &DiscreteProblem) {
+    fn grow(&mut self, degree: &[u32]) {
         let nowhere = self.nowhere();
         let n0 = self.initial();
-        let mut rows = Rows::new(problem, &self.vertex);
+        let mut rows = std::mem::take(&mut self.rows);
+        rows.clear(degree, &self.vertex);
+        self.around.clear();
+        self.around.reserve_exact(self.quad.len());
+        self.old_level.clear();
+        self.old_level.push(0);
+        self.old_vertex.clear();
+        self.old_start.clear();
+        self.old_start.push(0);
+        self.old_column.clear();
+        self.old_slot.clear();
         for x in 0..n0 {
             for m in self.macro_start[x]..self.macro_start[x + 1] {
                 let y = self.macro_end[m as usize];
@@ -230,8 +247,8 @@ impl Hierarchy {
                 rows.push(y, x as u32, slot);
             }
         }
-        // The level in which a vertex was listed as old last.
-        let mut listed = vec![0u16; self.len()];
+        let mut listed = std::mem::take(&mut self.listed);
+        refill(&mut listed, self.len(), 0);
         for level in 1..=self.depth() {
             for p in self.ranks(level) {
                 let quad = self.quad[p - n0];
@@ -276,69 +293,95 @@ impl Hierarchy {
             }
             self.old_level.push(self.old_vertex.len() as u32);
         }
+        self.rows = rows;
+        self.listed = listed;
     }
-}
 
-/// Vertices by level, within a level along the leaves; the way back; the first rank of every level.
-fn by_level(problem: &DiscreteProblem) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
-    let births = &problem.genealogy;
-    let depth = births.iter().map(|b| b.level).max().unwrap_or(0) as usize;
-    let mut level = vec![0u32; depth + 2];
-    for birth in births.iter() {
-        level[birth.level as usize + 1] += 1;
-    }
-    for l in 0..=depth {
-        level[l + 1] += level[l];
-    }
-    let mut next = level.clone();
-    let mut vertex = vec![0u32; births.len()];
-    let mut rank = vec![0u32; births.len()];
-    for &j in problem.along_leaves.iter() {
-        let at = &mut next[births[j as usize].level as usize];
-        vertex[*at as usize] = j;
-        rank[j as usize] = *at;
-        *at += 1;
-    }
-    (vertex, rank, level)
-}
-
-/// The edges of the initial mesh, by their larger rank: those that are edges still, and those that were bisected.
-fn macro_edges(
-    problem: &DiscreteProblem,
-    vertex: &[u32],
-    rank: &[u32],
-    n0: usize,
-) -> (Vec<u32>, Vec<u32>) {
-    let mut edges: Vec<[u32; 2]> = Vec::new();
-    for x in 0..n0 {
-        for &k in problem.pattern.columns(vertex[x] as usize) {
-            let y = rank[k as usize];
-            if (y as usize) < x {
-                edges.push([x as u32, y]);
+    /// Numbers the vertices by level, within a level along the leaves; the number of edges of every vertex of the mesh.
+    fn number(&mut self, mesh: &Mesh, initial: Option<&[u32]>) -> Vec<u32> {
+        let births = mesh.genealogy();
+        let depth = births.iter().map(|b| b.level).max().unwrap_or(0) as usize;
+        refill(&mut self.level, depth + 2, 0);
+        for birth in births {
+            self.level[birth.level as usize + 1] += 1;
+        }
+        for l in 0..=depth {
+            self.level[l + 1] += self.level[l];
+        }
+        let n0 = self.level[1] as usize;
+        let mut next = self.level.clone();
+        refill(&mut self.vertex, births.len(), 0);
+        refill(&mut self.rank, births.len(), u32::MAX);
+        if let Some(initial) = initial.filter(|order| order.len() == n0) {
+            for (p, &j) in initial.iter().enumerate() {
+                self.vertex[p] = j;
+                self.rank[j as usize] = p as u32;
             }
         }
+        let mut degree = vec![0u32; births.len()];
+        for (v, around) in mesh.triangles().iter().zip(mesh.neighbours()) {
+            for (i, v) in v.iter().enumerate() {
+                let j = v.index();
+                // Every corner of a triangle begins one edge of it; an edge on the boundary has no triangle that would count its end.
+                degree[j] += 1 + u32::from(around[(i + 1) % 3] == Neighbour::BOUNDARY);
+                if self.rank[j] == u32::MAX {
+                    let at = &mut next[births[j].level as usize];
+                    self.vertex[*at as usize] = j as u32;
+                    self.rank[j] = *at;
+                    *at += 1;
+                }
+            }
+        }
+        degree
     }
-    for birth in problem.genealogy.iter().filter(|b| b.level > 0) {
-        let [a, b] = birth.parents.map(|v| rank[v.index()]);
-        if (a as usize) < n0 && (b as usize) < n0 {
-            edges.push([a.max(b), a.min(b)]);
+
+    /// The edges of the initial mesh, by their larger rank: those that are edges still, and those that were bisected.
+    fn macro_edges(&mut self, mesh: &Mesh) {
+        let n0 = self.initial();
+        let rank = &self.rank;
+        let mut edges: Vec<[u32; 2]> = Vec::new();
+        let mut add = |a: VertexId, b: VertexId| {
+            let [x, y] = [a, b].map(|v| rank[v.index()]);
+            edges.push([x.max(y), x.min(y)]);
+        };
+        // Vertices keep their numbers, so those of the initial mesh come first there too.
+        let initial = |v: VertexId| v.index() < n0;
+        for (t, (v, around)) in mesh.triangles().iter().zip(mesh.neighbours()).enumerate() {
+            if v.iter().filter(|&&v| initial(v)).count() < 2 {
+                continue;
+            }
+            for face in 0..3 {
+                let (a, b) = (v[(face + 1) % 3], v[(face + 2) % 3]);
+                let own = around[face]
+                    .get()
+                    .is_none_or(|(other, _)| other.index() > t);
+                if own && initial(a) && initial(b) {
+                    add(a, b);
+                }
+            }
+        }
+        for birth in &mesh.genealogy()[n0..] {
+            let [a, b] = birth.parents;
+            if initial(a) && initial(b) {
+                add(a, b);
+            }
+        }
+        let start = &mut self.macro_start;
+        refill(start, n0 + 1, 0);
+        for [x, _] in &edges {
+            start[*x as usize + 1] += 1;
+        }
+        for x in 0..n0 {
+            start[x + 1] += start[x];
+        }
+        let mut next = start.clone();
+        refill(&mut self.macro_end, edges.len(), 0);
+        for [x, y] in edges {
+            self.macro_end[next[x as usize] as usize] = y;
+            next[x as usize] += 1;
+        }
+        for x in 0..n0 {
+            self.macro_end[start[x] as usize..start[x + 1] as usize].sort_unstable();
         }
     }
-    let mut start = vec![0u32; n0 + 1];
-    for [x, _] in &edges {
-        start[*x as usize + 1] += 1;
-    }
-    for x in 0..n0 {
-        start[x + 1] += start[x];
-    }
-    let mut next = start.clone();
-    let mut end = vec![0u32; edges.len()];
-    for [x, y] in edges {
-        end[next[x as usize] as usize] = y;
-        next[x as usize] += 1;
-    }
-    for x in 0..n0 {
-        end[start[x] as usize..start[x + 1] as usize].sort_unstable();
-    }
-    (start, end)
 }

@@ -16,17 +16,18 @@ mod step;
 mod tests;
 mod unknowns;
 
-use fem_core::SymmetricMatrix;
+use std::sync::{Arc, Weak};
+
+use fem_core::Mesh;
 
 use crate::error::SolveError;
 use crate::interior::Role;
-use crate::level::{Level, ROW_ROUNDING};
+use crate::level::{ROW_ROUNDING, named};
 use crate::problem::DiscreteProblem;
-use crate::reduce::{Proportional, initial_pair, pair_system};
+use crate::reduce::Proportional;
 use crate::settings::{Settings, Tolerance};
-use crate::solution::{Cycles, Reduction, Solution, SolveInfo, Status, kkt_residual};
+use crate::solution::{Cycles, Reduction, Solution, SolveInfo, Status};
 use crate::start::Start;
-use crate::system::System;
 use descent::{Descent, Goal, Report, Vectors};
 use finest::Finest;
 use galerkin::Levels;
@@ -49,7 +50,138 @@ const SLOW: f64 = 0.25;
 /// again.
 const AGEING: f64 = 1.25;
 
-/// A field after its descent, in the order of the mesh.
+/// What a solver keeps from one solve to the next: memory above all, and what was read off a mesh while it stays the same.
+///
+/// One workspace serves the levels of one run, whose meshes descend from one another.
+#[derive(Default)]
+pub struct Workspace {
+    /// The mesh that `hierarchy` was read off.
+    mesh: Weak<Mesh>,
+    /// The order of the vertices of the initial mesh.
+    initial: Vec<u32>,
+    hierarchy: Hierarchy,
+    scalar: Store<Scalar>,
+    pair: Store<Pair>,
+}
+
+/// Matrices of a mesh and of its levels.
+#[derive(Default)]
+struct Store<U: Unknowns> {
+    /// The matrix that `finest` holds for the mesh of the workspace, if it is one.
+    held: Option<Role>,
+    finest: Finest<U>,
+    levels: Levels<U>,
+}
+
+impl Workspace {
+    /// Takes in the mesh of a problem; false if it has no hierarchy.
+    fn take(&mut self, problem: &DiscreteProblem) -> bool {
+        let mesh = &problem.mesh;
+        if self.mesh.as_ptr() == Arc::as_ptr(mesh) {
+            return true;
+        }
+        if mesh.genealogy().iter().all(|birth| birth.level == 0) {
+            self.initial = along_leaves(mesh);
+            return false;
+        }
+        self.hierarchy.read(mesh, Some(&self.initial));
+        self.initial.clear();
+        self.initial
+            .extend_from_slice(self.hierarchy.initial_order());
+        self.mesh = Arc::downgrade(mesh);
+        self.scalar.held = None;
+        self.pair.held = None;
+        true
+    }
+}
+
+/// The vertices of a mesh in the order in which its triangles touch them first.
+fn along_leaves(mesh: &Mesh) -> Vec<u32> {
+    let mut seen = vec![false; mesh.vertex_count()];
+    let all = mesh.triangles().iter().flatten();
+    all.filter(|v| !std::mem::replace(&mut seen[v.index()], true))
+        .map(|v| v.0)
+        .collect()
+}
+
+impl<U: Unknowns> Store<U> {
+    /// Assembles a matrix, unless it is there.
+    fn hold(
+        &mut self,
+        role: Role,
+        hierarchy: &Hierarchy,
+        mesh: &Mesh,
+        coefficient: impl Fn(usize, usize) -> f64,
+    ) {
+        if self.held != Some(role) {
+            self.finest.assemble(hierarchy, mesh, coefficient);
+            self.levels.fit(hierarchy);
+            self.held = Some(role);
+        }
+    }
+}
+
+/// The solution by multigrid; `None` on a mesh without bisections, where the initial mesh is everything.
+///
+/// Its status says whether every field of the model reached its goal; sigma is empty where its own solve did not converge.
+pub(crate) fn solve(
+    problem: &DiscreteProblem,
+    settings: &Settings,
+    start: Option<&Start>,
+    workspace: &mut Workspace,
+) -> Result<Option<Solution>, SolveError> {
+    if !workspace.take(problem) {
+        return Ok(None);
+    }
+    let Workspace {
+        hierarchy,
+        scalar,
+        pair,
+        ..
+    } = workspace;
+    let run = Run {
+        problem,
+        settings,
+        start,
+        hierarchy,
+    };
+    let reduced = Proportional::of(problem).filter(|_| settings.reduce);
+    match reduced {
+        Some(model) => run.reduced(&model, scalar),
+        None => run.pair(pair, scalar),
+    }
+    .map(Some)
+}
+
+/// K sigma = z for given forces, where there is a hierarchy and the method converges.
+pub(crate) fn sigma(
+    problem: &DiscreteProblem,
+    settings: &Settings,
+    force: &[f64],
+    workspace: &mut Workspace,
+) -> Result<Option<Vec<f64>>, SolveError> {
+    if !workspace.take(problem) {
+        return Ok(None);
+    }
+    let run = Run {
+        problem,
+        settings,
+        start: None,
+        hierarchy: &workspace.hierarchy,
+    };
+    let (sigma, _) = run.sigma(force, &mut workspace.scalar)?;
+    Ok(Some(sigma).filter(|s| !s.is_empty()))
+}
+
+/// One solve on one hierarchy.
+struct Run<'a> {
+    problem: &'a DiscreteProblem,
+    settings: &'a Settings,
+    start: Option<&'a Start>,
+    hierarchy: &'a Hierarchy,
+}
+
+/// A field after its descent, in the order of the hierarchy.
 struct Solved<U: Unknowns> {
     x: Vec<U::Value>,
     /// The residual, of an inequality.
@@ -58,177 +190,178 @@ struct Solved<U: Unknowns> {
     report: Report,
 }
 
-/// The solution by multigrid; `None` on a mesh without bisections, where the initial mesh is everything.
-///
-/// Its status says whether every field of the model reached its goal; sigma is empty where its own solve did not converge.
-pub(crate) fn solve(
-    level: &Level,
-    settings: &Settings,
-    start: Option<&Start>,
-) -> Result<Option<Solution>, SolveError> {
-    let problem = level.problem;
-    if !has_levels(problem) {
-        return Ok(None);
-    }
-    let hierarchy = Hierarchy::new(problem);
-    let run = Run {
-        level,
-        settings,
-        start,
-        hierarchy: &hierarchy,
-    };
-    let reduced = Proportional::of(problem).filter(|_| settings.reduce);
-    match reduced {
-        Some(model) => run.reduced(&model),
-        None => run.pair(),
-    }
-    .map(Some)
-}
-
-/// K sigma = z for given forces, where there is a hierarchy and the method converges.
-pub(crate) fn sigma(
-    level: &Level,
-    settings: &Settings,
-    force: &[f64],
-) -> Result<Option<Vec<f64>>, SolveError> {
-    if !has_levels(level.problem) {
-        return Ok(None);
-    }
-    let run = Run {
-        level,
-        settings,
-        start: None,
-        hierarchy: &Hierarchy::new(level.problem),
-    };
-    let (sigma, _) = run.sigma(force, None)?;
-    Ok(Some(sigma).filter(|s| !s.is_empty()))
-}
-
-/// One solve on one hierarchy.
-struct Run<'a> {
-    level: &'a Level<'a>,
-    settings: &'a Settings,
-    start: Option<&'a Start>,
-    hierarchy: &'a Hierarchy,
-}
-
 /// What the fields of a model add up to.
 struct Model {
     displacement: [Vec<f64>; 2],
     force: Vec<f64>,
     contact: Vec<bool>,
     reduction: Reduction,
-    /// Matrix and levels of sigma, where the model has them.
-    laplacian: Option<(Finest<Scalar>, Levels<Scalar>)>,
     mean: Option<Report>,
     inequality: Report,
+    kkt_residual: f64,
     error_squared: f64,
 }
 
 impl Run<'_> {
-    fn reduced(&self, model: &Proportional) -> Result<Solution, SolveError> {
-        let interior = &self.level.interior;
-        let matrices = [model.matrix];
-        let finest = Finest::<Scalar>::new(self.hierarchy, &matrices);
-        let mut levels = Levels::<Scalar>::new(self.hierarchy);
-        let none = vec![false; self.hierarchy.len()];
-        levels.sweep(self.hierarchy, &finest, &none)?;
-        drop(none);
+    fn reduced(
+        &self,
+        model: &Proportional,
+        store: &mut Store<Scalar>,
+    ) -> Result<Solution, SolveError> {
+        let problem = self.problem;
+        let hierarchy = self.hierarchy;
+        let tension = &problem.tension_mean[0];
+        store.hold(model.role, hierarchy, &problem.mesh, |_, t| {
+            match model.role {
+                Role::Laplacian => 1.0,
+                Role::Stiffness => tension[t],
+            }
+        });
+        let Store { finest, levels, .. } = store;
+        levels.sweep(hierarchy, finest, &[])?;
         let [mean_weight, gap_weight] = model.energy_weights();
-        let initial = model.initial_mean(interior, self.start);
-        let mean_load = |_: usize, j: usize| model.mean_load(j);
-        let vectors = self.vectors::<Scalar>(&matrices, &[initial], &mean_load, true);
+        let boundary = |j: usize| model.mean_of([0, 1].map(|i| problem.heights[i][j]));
+        let initial = |j: usize| {
+            self.start
+                .map_or(0.0, |s| model.mean_of([0, 1].map(|i| s.displacement[i][j])))
+        };
+        let load = |j: usize| model.mean_load(j);
+        let vectors = self.vectors(finest, levels, boundary, initial, load, true);
         let goal = self.goal(mean_weight, Goal::Tight);
-        let mean = self.descend(&finest, &mut levels, &matrices, None, vectors, goal)?;
+        let mean = self.descend(finest, levels, None, vectors, goal)?;
         let size = mean.x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let system = model.system(interior);
-        let initial = model.initial_gap(interior, self.start).remove(0);
-        let load = |i: usize, j: usize| system.loads[i][j];
-        let mut vectors = self.vectors::<Scalar>(&matrices, &[initial], &load, true);
+        let boundary = |j: usize| problem.heights[0][j] - problem.heights[1][j];
+        let initial = |j: usize| {
+            self.start.map_or(0.0, |s| {
+                (s.displacement[0][j] - s.displacement[1][j]).max(0.0)
+            })
+        };
+        let load = |j: usize| model.gap_load(j).0;
+        let mut vectors = self.vectors(finest, levels, boundary, initial, load, true);
         // Half the gap and the mean are bounds of the largest displacement from below.
         vectors.boundary_size = vectors.boundary_size.max(2.0 * size);
         let goal = self.goal(gap_weight, Goal::Kkt(0.5 * SHARE * self.kkt()));
-        let gap = self.descend(
-            &finest,
-            &mut levels,
-            &matrices,
-            Some(&system),
-            vectors,
-            goal,
-        )?;
-        let displacement = model.displacements(interior, &mean.x, &gap.x);
-        let mut force = vec![0.0; self.hierarchy.len()];
-        for j in interior.iter().filter(|&j| gap.contact[j]) {
-            let terms = system.loads[0][j].abs() + model.matrix.row_dot_abs(j, &gap.x);
-            if -gap.r[j] > ROW_ROUNDING * terms {
-                force[j] = -gap.r[j];
+        let scale = |j: usize| model.gap_load(j).1;
+        let gap = self.descend(finest, levels, Some(&scale), vectors, goal)?;
+
+        // The pull on a closed gap becomes the force, where it is more than rounding.
+        let n = hierarchy.len();
+        let mut force = gap.r;
+        for p in 0..n {
+            let r = force[p];
+            let held = gap.contact[p] && !hierarchy.fixed[p] && r < 0.0;
+            force[p] = if held && {
+                let scale = model.gap_load(hierarchy.vertex[p] as usize).1;
+                -r > ROW_ROUNDING * (scale + row_magnitude(hierarchy, finest, &gap.x, p)[0])
+            } {
+                model.force(-r)
+            } else {
+                0.0
+            };
+        }
+        let [mut upper, mut lower] = [mean.x, gap.x];
+        for p in 0..n {
+            if !hierarchy.fixed[p] {
+                [upper[p], lower[p]] = model.displacements(upper[p], lower[p]);
             }
         }
-        model.forces(&mut force);
+        let mut product = |i: usize, u: &[f64]| {
+            let mut y = levels.vector(n);
+            finest.multiply(hierarchy, u, &mut y);
+            finest.add_boundary(1.0, |j| problem.heights[i][j], &mut y);
+            y
+        };
+        let products = [product(0, &upper), product(1, &lower)];
+        let stiffness = model.tension();
+        let (solved, kkt_residual) = self.conclude(
+            |p| [upper[p], lower[p]],
+            |p| [0, 1].map(|i| stiffness[i] * products[i][p]),
+            |p| [0, 1].map(|i| stiffness[i] * finest.diagonal[p]),
+            &force,
+            &gap.contact,
+        );
+        levels.spare.extend(products);
+        levels.spare.extend([upper, lower, force]);
+        let (displacement, force, contact) = solved;
         let error_squared =
             mean_weight * mean.report.error_squared + gap_weight * gap.report.error_squared;
-        self.finish(Model {
+        let model = Model {
             displacement,
             force,
-            reduction: self.level.named(&gap.contact, model.reduction),
-            contact: gap.contact,
-            laplacian: (model.role == Role::Laplacian).then_some((finest, levels)),
+            reduction: named(problem, &contact, model.reduction),
+            contact,
             mean: Some(mean.report),
             inequality: gap.report,
+            kkt_residual,
             error_squared,
-        })
+        };
+        self.finish(model, store)
     }
 
-    fn pair(&self) -> Result<Solution, SolveError> {
-        let interior = &self.level.interior;
-        let problem = self.level.problem;
-        let system = pair_system(problem, interior);
-        let initial = initial_pair(problem, interior, self.start);
-        let load = |i: usize, j: usize| system.loads[i][j];
-        let finest = Finest::<Pair>::new(self.hierarchy, &system.matrices);
-        let mut levels = Levels::<Pair>::new(self.hierarchy);
-        let vectors = self.vectors::<Pair>(&system.matrices, &initial, &load, false);
+    fn pair(
+        &self,
+        store: &mut Store<Pair>,
+        scalar: &mut Store<Scalar>,
+    ) -> Result<Solution, SolveError> {
+        let problem = self.problem;
+        let hierarchy = self.hierarchy;
+        let tension = &problem.tension_mean;
+        store.hold(Role::Stiffness, hierarchy, &problem.mesh, |i, t| {
+            tension[i][t]
+        });
+        let Store { finest, levels, .. } = store;
+        let boundary = |j: usize| [0, 1].map(|i| problem.heights[i][j]);
+        let initial = |j: usize| {
+            self.start
+                .map_or([0.0; 2], |s| [0, 1].map(|i| s.displacement[i][j]))
+        };
+        let load = |j: usize| [0, 1].map(|i| problem.loads[i].nodal[j]);
+        let vectors = self.vectors(finest, levels, boundary, initial, load, false);
         let goal = self.goal(0.5, Goal::Kkt(SHARE * self.kkt()));
-        let both = self.descend(
-            &finest,
-            &mut levels,
-            &system.matrices,
-            Some(&system),
-            vectors,
-            goal,
-        )?;
-        drop((finest, levels));
-        let mut displacement = problem.heights.clone();
-        let mut force = vec![0.0; self.hierarchy.len()];
-        for j in interior.iter() {
-            let u = both.x[j];
-            displacement[0][j] = u[0];
-            displacement[1][j] = u[1];
-        }
-        for j in interior.iter().filter(|&j| both.contact[j]) {
-            let i = usize::from(problem.diagonal(1, j) < problem.diagonal(0, j));
-            let z = if i == 0 { -both.r[j][0] } else { both.r[j][1] };
-            let terms =
-                system.loads[i][j].abs() + problem.stiffness[i].row_dot_abs(j, &displacement[i]);
+        let scale = |j: usize| {
+            let [f, g] = load(j).map(f64::abs);
+            f.min(g)
+        };
+        let both = self.descend(finest, levels, Some(&scale), vectors, goal)?;
+        let mut force = vec![0.0; hierarchy.len()];
+        for p in (0..force.len()).filter(|&p| both.contact[p] && !hierarchy.fixed[p]) {
+            let [d1, d2] = finest.diagonal[p];
+            let i = usize::from(d2 < d1);
+            let z = if i == 0 { -both.r[p][0] } else { both.r[p][1] };
+            let load = load(hierarchy.vertex[p] as usize)[i].abs();
+            let terms = load + row_magnitude(hierarchy, finest, &both.x, p)[i];
             if z > ROW_ROUNDING * terms {
-                force[j] = z;
+                force[p] = z;
             }
         }
+        let mut product = levels.vector(hierarchy.len());
+        finest.multiply(hierarchy, &both.x, &mut product);
+        finest.add_boundary(1.0, boundary, &mut product);
+        let (solved, kkt_residual) = self.conclude(
+            |p| both.x[p],
+            |p| product[p],
+            |p| finest.diagonal[p],
+            &force,
+            &both.contact,
+        );
+        levels.spare.extend([product, both.x, both.r]);
+        let (displacement, force, contact) = solved;
         let reduction = if self.settings.reduce {
-            self.level.named(&both.contact, Reduction::TwoField)
+            named(problem, &contact, Reduction::TwoField)
         } else {
             Reduction::TwoField
         };
-        self.finish(Model {
+        let model = Model {
             displacement,
             force,
-            contact: both.contact,
+            contact,
             reduction,
-            laplacian: None,
             mean: None,
             inequality: both.report,
+            kkt_residual,
             error_squared: both.report.error_squared,
-        })
+        };
+        self.finish(model, scalar)
     }
 
     /// The KKT residual to go to.
@@ -247,97 +380,118 @@ impl Run<'_> {
         }
     }
 
-    /// Values and loads in the order of the hierarchy.
+    /// Values and loads in the order of the hierarchy, from functions of the vertices of the mesh; what the values on the boundary
+    /// contribute is moved right.
     fn vectors<U: Unknowns>(
         &self,
-        matrices: &[&SymmetricMatrix],
-        values: &[Vec<f64>],
-        load: &dyn Fn(usize, usize) -> f64,
+        finest: &Finest<U>,
+        levels: &mut Levels<U>,
+        boundary: impl Fn(usize) -> U::Value,
+        initial: impl Fn(usize) -> U::Value,
+        load: impl Fn(usize) -> U::Value,
         plain: bool,
     ) -> Vectors<U> {
-        let boundary = &self.level.problem.boundary;
-        let pattern = matrices[0].pattern();
-        let n = self.hierarchy.len();
-        let mut vectors = Vectors {
-            x: vec![U::Value::default(); n],
-            b: vec![U::Value::default(); n],
-            boundary_size: 0.0,
-            plain,
-        };
-        for (p, &j) in self.hierarchy.vertex.iter().enumerate() {
+        let hierarchy = self.hierarchy;
+        let n = hierarchy.len();
+        let [mut x, mut b] = [(); 2].map(|()| levels.vector(n));
+        for (p, &j) in hierarchy.vertex.iter().enumerate() {
+            let inner = !hierarchy.fixed[p];
             let j = j as usize;
-            let own = U::value(|i| values[i][j]);
-            if boundary[j] {
-                vectors.boundary_size = vectors.boundary_size.max(U::size(own));
-                continue;
-            }
-            vectors.x[p] = own;
-            vectors.b[p] = U::value(|i| load(i, j));
+            x[p] = if inner {
+                initial(j)
+            } else {
+                U::Value::default()
+            };
+            b[p] = if inner { load(j) } else { U::Value::default() };
         }
-        for &p in &self.hierarchy.boundary {
-            let j = self.hierarchy.vertex[p as usize] as usize;
-            let own = U::value(|i| values[i][j]);
-            for (at, &k) in pattern.range(j).zip(pattern.columns(j)) {
-                if !boundary[k as usize] {
-                    let b = &mut vectors.b[self.hierarchy.rank[k as usize] as usize];
-                    *b = U::plus_plain(*b, U::plain(|i| -matrices[i].values()[at]), own);
-                }
-            }
+        finest.add_boundary(-1.0, &boundary, &mut b);
+        let on_boundary = hierarchy.boundary.iter();
+        let sizes = on_boundary.map(|&p| U::size(boundary(hierarchy.vertex[p as usize] as usize)));
+        Vectors {
+            x,
+            b,
+            boundary_size: sizes.fold(0.0, f64::max),
+            plain,
         }
-        vectors
     }
 
-    /// Solves for one field, or two that are coupled; `system` is there for an inequality.
+    /// Solves for one field, or two that are coupled; `scale` is there for an inequality: the sum of the magnitudes that the load of a
+    /// vertex of the mesh was computed from.
     fn descend<U: Unknowns>(
         &self,
         finest: &Finest<U>,
         levels: &mut Levels<U>,
-        matrices: &[&SymmetricMatrix],
-        system: Option<&System>,
+        scale: Option<&dyn Fn(usize) -> f64>,
         vectors: Vectors<U>,
         goal: Goal,
     ) -> Result<Solved<U>, SolveError> {
         let hierarchy = self.hierarchy;
-        let load_scale = |p: usize| {
-            let j = hierarchy.vertex[p] as usize;
-            system.map_or(0.0, |s| {
-                let scales = s.load_scale.iter().map(|scale| scale[j]);
-                scales.fold(f64::INFINITY, f64::min)
-            })
-        };
-        let mut descent = Descent::new(
-            hierarchy,
-            finest,
-            levels,
-            matrices,
-            system.is_some(),
-            &load_scale,
-            vectors,
-        );
+        let load_scale = |p: usize| scale.map_or(0.0, |scale| scale(hierarchy.vertex[p] as usize));
+        let inequality = scale.is_some();
+        let mut descent = Descent::new(hierarchy, finest, levels, inequality, &load_scale, vectors);
         let left = self.start.and_then(|s| s.first_cycle).map(|c| c * c);
         let report = descent.run(goal, self.start.is_none(), left)?;
-        descent.settle();
-        let back = |values: &[U::Value]| -> Vec<U::Value> {
-            hierarchy.rank.iter().map(|&p| values[p as usize]).collect()
-        };
-        let contact = |&p: &u32| descent.contact[p as usize] && !hierarchy.fixed[p as usize];
-        let solved = Solved {
-            x: back(&descent.x),
-            r: if system.is_some() {
-                back(&descent.r)
-            } else {
-                Vec::new()
-            },
-            contact: hierarchy.rank.iter().map(contact).collect(),
+        if inequality {
+            descent.settle();
+        }
+        let (x, r, contact) = descent.release();
+        Ok(Solved {
+            x,
+            r,
+            contact,
             report,
-        };
-        descent.release();
-        Ok(solved)
+        })
+    }
+
+    /// Displacements, forces and contact set in the order of the mesh, and the relative KKT residual
+    /// ([`kkt_residual`](crate::kkt_residual)) from displacements, products and diagonals in the order of the hierarchy.
+    #[allow(clippy::type_complexity, reason = "three arrays and a number")]
+    fn conclude(
+        &self,
+        displacement: impl Fn(usize) -> [f64; 2],
+        product: impl Fn(usize) -> [f64; 2],
+        diagonal: impl Fn(usize) -> [f64; 2],
+        force: &[f64],
+        contact: &[bool],
+    ) -> (([Vec<f64>; 2], Vec<f64>, Vec<bool>), f64) {
+        let problem = self.problem;
+        let hierarchy = self.hierarchy;
+        let n = hierarchy.len();
+        let mut own = [vec![0.0; n], vec![0.0; n]];
+        let (mut z, mut touching) = (vec![0.0; n], vec![false; n]);
+        let mut unit = 0.0f64;
+        let (mut finite, mut worst) = (true, 0.0f64);
+        for (p, &j) in hierarchy.vertex.iter().enumerate() {
+            let j = j as usize;
+            let fixed = hierarchy.fixed[p];
+            let u = if fixed {
+                [0, 1].map(|i| problem.heights[i][j])
+            } else {
+                displacement(p)
+            };
+            [own[0][j], own[1][j]] = u;
+            unit = unit.max(u[0].abs()).max(u[1].abs());
+            finite &= u[0].is_finite() && u[1].is_finite() && force[p].is_finite();
+            if fixed {
+                continue;
+            }
+            z[j] = force[p];
+            touching[j] = contact[p];
+            let (product, d) = (product(p), diagonal(p));
+            for (i, sign) in [(0, 1.0), (1, -1.0)] {
+                let rest = problem.loads[i].nodal[j] + sign * force[p] - product[i];
+                worst = worst.max(rest.abs() / d[i]);
+            }
+            let harmonic = d[0] / (1.0 + d[0] / d[1]);
+            worst = worst.max((u[0] - u[1]).min(force[p] / harmonic).abs());
+        }
+        let unit = if unit == 0.0 { 1.0 } else { unit };
+        let residual = if finite { worst / unit } else { f64::INFINITY };
+        ((own, z, touching), residual)
     }
 
     /// sigma and the record.
-    fn finish(&self, model: Model) -> Result<Solution, SolveError> {
-        let problem = self.level.problem;
+    fn finish(&self, model: Model, store: &mut Store<Scalar>) -> Result<Solution, SolveError> {
         let Model {
             displacement,
             force,
@@ -345,9 +499,9 @@ impl Run<'_> {
             ..
         } = model;
         let (sigma, sigma_report) = if self.settings.sigma {
-            self.sigma(&force, model.laplacian)?
+            self.sigma(&force, store)?
         } else {
-            (vec![0.0; force.len()], None)
+            (Vec::new(), None)
         };
         let inequality = model.inequality;
         let reports = [Some(inequality), model.mean];
@@ -376,7 +530,7 @@ impl Run<'_> {
                 .map_or(0, |r| r.factorisations)
                 .max(inequality.factorisations),
         };
-        let n = self.level.interior.len();
+        let n = self.hierarchy.len() - self.hierarchy.boundary.len();
         let info = SolveInfo {
             solver: MULTIGRID,
             reduction: model.reduction,
@@ -387,7 +541,7 @@ impl Run<'_> {
             } else {
                 2 * n
             },
-            kkt_residual: kkt_residual(problem, &displacement, &force),
+            kkt_residual: model.kkt_residual,
             algebraic_error: Some(model.error_squared.max(0.0).sqrt()),
             contraction,
             first_cycle,
@@ -406,32 +560,48 @@ impl Run<'_> {
     fn sigma(
         &self,
         force: &[f64],
-        laplacian: Option<(Finest<Scalar>, Levels<Scalar>)>,
+        store: &mut Store<Scalar>,
     ) -> Result<(Vec<f64>, Option<Report>), SolveError> {
         if force.iter().all(|&z| z == 0.0) {
             return Ok((vec![0.0; force.len()], None));
         }
-        let matrices = [&self.level.problem.laplacian];
-        let (finest, mut levels) = match laplacian {
-            Some(both) => both,
-            None => (
-                Finest::new(self.hierarchy, &matrices),
-                Levels::new(self.hierarchy),
-            ),
-        };
-        let load = |_: usize, j: usize| force[j];
-        let initial = match self.start.and_then(|s| s.sigma.as_ref()) {
-            Some(sigma) => sigma.clone(),
-            None => vec![0.0; force.len()],
-        };
-        let vectors = self.vectors::<Scalar>(&matrices, &[initial], &load, false);
-        let solved = self.descend(&finest, &mut levels, &matrices, None, vectors, Goal::Tight)?;
+        let hierarchy = self.hierarchy;
+        store.hold(Role::Laplacian, hierarchy, &self.problem.mesh, |_, _| 1.0);
+        let Store { finest, levels, .. } = store;
+        let known = self.start.and_then(|s| s.sigma.as_ref());
+        let initial = |j: usize| known.map_or(0.0, |sigma| sigma[j]);
+        let vectors = self.vectors(finest, levels, |_| 0.0, initial, |j| force[j], false);
+        let solved = self.descend(finest, levels, None, vectors, Goal::Tight)?;
         let sigma = match solved.report.status {
-            Status::Converged => solved.x,
+            Status::Converged => {
+                let own = hierarchy.rank.iter();
+                own.map(|&p| solved.x[p as usize]).collect()
+            }
             _ => Vec::new(),
         };
+        levels.spare.push(solved.x);
         Ok((sigma, Some(solved.report)))
     }
+}
+
+/// The sums `|A||x|` of the row of a rank, one a field.
+fn row_magnitude<U: Unknowns>(
+    hierarchy: &Hierarchy,
+    finest: &Finest<U>,
+    x: &[U::Value],
+    p: usize,
+) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    let mut add = |entry: U::Plain, q: usize| {
+        for i in 0..U::WIDTH {
+            sum[i] += (U::plain_at(entry, i) * U::at(x[q], i)).abs();
+        }
+    };
+    add(finest.diagonal[p], p);
+    for &[q, slot] in hierarchy.rows.row(p as u32) {
+        add(finest.at(slot), q as usize);
+    }
+    sum
 }
 
 /// Converged if all are, else the first that is not.
@@ -440,9 +610,4 @@ fn worst_status(statuses: impl Iterator<Item = Status>) -> Status {
         .into_iter()
         .find(|&s| s != Status::Converged)
         .unwrap_or(Status::Converged)
-}
-
-/// Whether a problem has a hierarchy to work on.
-pub(crate) fn has_levels(problem: &DiscreteProblem) -> bool {
-    problem.genealogy.iter().any(|birth| birth.level > 0)
 }

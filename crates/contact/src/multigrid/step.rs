@@ -71,10 +71,15 @@ impl<U: Unknowns> Descent<'_, U> {
                 }
             }
         }
-        let against = dot::<U>(&self.correction, &self.image);
-        let beta = self.curvature.map_or(0.0, |curvature| -against / curvature);
-        for (d, &c) in self.direction.iter_mut().zip(&self.correction) {
-            *d = U::plus(c, beta, *d);
+        match self.curvature {
+            Some(curvature) => {
+                let beta = -dot::<U>(&self.correction, &self.image) / curvature;
+                for (d, &c) in self.direction.iter_mut().zip(&self.correction) {
+                    *d = U::plus(c, beta, *d);
+                }
+            }
+            // Without a direction before it the correction is the direction.
+            None => std::mem::swap(&mut self.direction, &mut self.correction),
         }
         self.multiply_direction();
         let curvature = dot::<U>(&self.direction, &self.image);
@@ -135,14 +140,14 @@ impl<U: Unknowns> Descent<'_, U> {
 
     /// Takes changes of single values into the residual; twice the energy they cost.
     fn move_residual(&mut self, changes: &[Change<U>]) -> f64 {
-        let matrices = self.matrices;
-        let pattern = matrices[0].pattern();
+        let (hierarchy, finest) = (self.hierarchy, self.finest);
         for &(p, change, _) in changes {
-            let j = self.hierarchy.vertex[p] as usize;
-            for (at, &k) in pattern.range(j).zip(pattern.columns(j)) {
-                let q = self.hierarchy.rank[k as usize] as usize;
-                let a = U::plain(|i| -matrices[i].values()[at]);
-                if !self.hierarchy.fixed[q] {
+            let own = U::plain_times(-1.0, finest.diagonal[p]);
+            self.r[p] = U::plus_plain(self.r[p], own, change);
+            for &[q, slot] in hierarchy.rows.row(p as u32) {
+                let q = q as usize;
+                if !hierarchy.fixed[q] {
+                    let a = U::plain_times(-1.0, finest.at(slot));
                     self.r[q] = U::plus_plain(self.r[q], a, change);
                 }
             }
@@ -156,11 +161,9 @@ impl<U: Unknowns> Descent<'_, U> {
     /// One monotone cycle; twice the energy it has lost.
     fn monotone(&mut self) -> Result<f64, SolveError> {
         let n = self.x.len();
-        let none = vec![false; n];
-        self.levels.sweep(self.hierarchy, self.finest, &none)?;
+        self.levels.sweep(self.hierarchy, self.finest, &[])?;
         self.swept = false;
         self.curvature = None;
-        self.image.fill(U::Value::default());
         let mut bound: Vec<f64> = (0..n).map(|p| -U::gap(self.x[p]).max(0.0)).collect();
         self.scratch.copy_from_slice(&self.r);
         let mut old_bound = Vec::new();
@@ -171,7 +174,7 @@ impl<U: Unknowns> Descent<'_, U> {
             &mut bound,
             &mut old_bound,
         );
-        let mut before = std::mem::take(&mut self.r);
+        let before = std::mem::take(&mut self.r);
         self.r = std::mem::take(&mut self.image);
         for p in 0..n {
             let x = U::plus(self.x[p], 1.0, self.correction[p]);
@@ -190,7 +193,6 @@ impl<U: Unknowns> Descent<'_, U> {
         for p in 0..n {
             loss += U::dot(self.correction[p], U::plus(before[p], 1.0, self.r[p]));
         }
-        before.fill(U::Value::default());
         self.image = before;
         Ok(loss.max(0.0))
     }

@@ -60,25 +60,38 @@ fn truncate<U: Unknowns>(finest: &Finest<U>, contact: &[bool], x: &mut [U::Value
     }
 }
 
+fn hierarchy(problem: &DiscreteProblem) -> Hierarchy {
+    let mut hierarchy = Hierarchy::default();
+    hierarchy.read(&problem.mesh, None);
+    hierarchy
+}
+
+fn levels<U: Unknowns>(hierarchy: &Hierarchy) -> Levels<U> {
+    let mut levels = Levels::default();
+    levels.fit(hierarchy);
+    levels
+}
+
 fn finest<U: Unknowns>(problem: &DiscreteProblem, hierarchy: &Hierarchy) -> Finest<U> {
-    let matrices: Vec<_> = problem.stiffness.iter().take(U::WIDTH).collect();
-    Finest::new(hierarchy, &matrices)
+    let mut finest = Finest::default();
+    finest.assemble(hierarchy, &problem.mesh, |i, t| problem.tension_mean[i][t]);
+    finest
 }
 
 #[test]
 fn levels_are_prefixes_and_every_edge_has_its_slot() {
     for levels in [0, 1, 9] {
         let problem = problem(levels);
-        let h = Hierarchy::new(&problem);
+        let h = hierarchy(&problem);
         assert_eq!(h.around.len(), h.quad.len());
         assert_eq!(h.level.last(), Some(&(h.len() as u32)));
         for p in 0..h.len() {
             let j = h.vertex[p] as usize;
             assert_eq!(h.rank[j] as usize, p);
-            let level = problem.genealogy[j].level as usize;
+            let level = problem.mesh.genealogy()[j].level as usize;
             assert!(h.ranks(level).contains(&p));
             let mut seen = 0;
-            for &k in problem.pattern.columns(j) {
+            for &k in problem.pattern().columns(j) {
                 let q = h.rank[k as usize] as usize;
                 if q < p {
                     assert!(h.slot(p, q).is_some_and(|s| s < h.slots() - 1));
@@ -106,7 +119,7 @@ fn levels_are_prefixes_and_every_edge_has_its_slot() {
 #[test]
 fn the_product_is_that_of_the_matrix() {
     let problem = problem(7);
-    let h = Hierarchy::new(&problem);
+    let h = hierarchy(&problem);
     let finest = finest::<Pair>(&problem, &h);
     let x = values::<Pair>(&h, &mut Random(3));
     let mut y = vec![[0.0; 2]; h.len()];
@@ -115,8 +128,8 @@ fn the_product_is_that_of_the_matrix() {
         let plain: Vec<f64> = h.rank.iter().map(|&p| x[p as usize][i]).collect();
         for p in (0..h.len()).filter(|&p| !h.fixed[p]) {
             let j = h.vertex[p] as usize;
-            let exact = problem.stiffness[i].row_dot(j, &plain);
-            let scale = problem.stiffness[i].row_dot_abs(j, &plain);
+            let exact = problem.stiffness(i).row_dot(j, &plain);
+            let scale = problem.stiffness(i).row_dot_abs(j, &plain);
             assert!((y[p][i] - exact).abs() <= 1e-15 * scale.max(1.0));
         }
     }
@@ -140,13 +153,13 @@ fn hat<U: Unknowns>(h: &Hierarchy, level: usize, rank: usize, i: usize) -> Vec<U
 /// Every stored row of every level is the Galerkin product of truncated hat functions.
 fn galerkin<U: Unknowns>(contact_seed: Option<u64>) {
     let problem = problem(6);
-    let h = Hierarchy::new(&problem);
+    let h = hierarchy(&problem);
     let finest = finest::<U>(&problem, &h);
     let contact = match contact_seed {
         Some(seed) => contact(&h, &mut Random(seed)),
         None => vec![false; h.len()],
     };
-    let mut levels = Levels::<U>::new(&h);
+    let mut levels = levels::<U>(&h);
     levels.sweep(&h, &finest, &contact).unwrap();
     let function = |level: usize, rank: usize, i: usize| {
         let mut x = hat::<U>(&h, level, rank, i);
@@ -201,14 +214,14 @@ fn rows_of_all_levels_are_galerkin_products() {
 /// The preconditioner is symmetric and positive, and close to the inverse where nothing is truncated.
 fn preconditioner<U: Unknowns>(seed: Option<u64>) {
     let problem = problem(8);
-    let h = Hierarchy::new(&problem);
+    let h = hierarchy(&problem);
     let finest = finest::<U>(&problem, &h);
     let mut random = Random(5);
     let contact = match seed {
         Some(seed) => contact(&h, &mut Random(seed)),
         None => vec![false; h.len()],
     };
-    let mut levels = Levels::<U>::new(&h);
+    let mut levels = levels::<U>(&h);
     levels.sweep(&h, &finest, &contact).unwrap();
     let gathered = |x: &[U::Value]| -> Vec<U::Value> {
         (0..x.len())
@@ -234,7 +247,8 @@ fn preconditioner<U: Unknowns>(seed: Option<u64>) {
         let (bx, by) = (apply(&x), apply(&y));
         let (one, other) = (dot::<U>(&bx, &y), dot::<U>(&x, &by));
         let scale = (dot::<U>(&bx, &x) * dot::<U>(&by, &y)).sqrt();
-        assert!((one - other).abs() <= 1e-11 * scale, "{one} {other}");
+        // Nearly empty hats multiply rounding: up to 1.4e-11 is seen over these sets.
+        assert!((one - other).abs() <= 1e-10 * scale, "{one} {other}");
         assert!(dot::<U>(&bx, &x) > 0.0);
         // Energies of B A lie in (0, 1]: a symmetric cycle never overshoots.
         let mut v = y.clone();
@@ -250,7 +264,7 @@ fn preconditioner<U: Unknowns>(seed: Option<u64>) {
 
 #[test]
 fn the_cycle_is_symmetric_and_does_not_overshoot() {
-    for seed in [None, Some(1), Some(2)] {
+    for seed in [None].into_iter().chain((1..30).map(Some)) {
         preconditioner::<Scalar>(seed);
         preconditioner::<Pair>(seed);
     }
@@ -259,10 +273,10 @@ fn the_cycle_is_symmetric_and_does_not_overshoot() {
 /// Monotone cycles keep the bounds and lower the energy, each time.
 fn monotone<U: Unknowns>() {
     let problem = problem(8);
-    let h = Hierarchy::new(&problem);
+    let h = hierarchy(&problem);
     let finest = finest::<U>(&problem, &h);
     let none = vec![false; h.len()];
-    let mut levels = Levels::<U>::new(&h);
+    let mut levels = levels::<U>(&h);
     levels.sweep(&h, &finest, &none).unwrap();
     for seed in 0..10 {
         // Pressed hard nearly everywhere: coarse corrections would go far beyond the bounds.
@@ -365,10 +379,9 @@ fn gaps_that_a_monotone_cycle_closes_are_closed_exactly() {
         heights: [&|_, _| 0.0, &|_, _| 0.0],
     };
     let problem = data.on(&mesh);
-    let h = Hierarchy::new(&problem);
-    let matrices = [&problem.stiffness[0], &problem.stiffness[1]];
-    let finest = Finest::<Pair>::new(&h, &matrices);
-    let mut levels = Levels::<Pair>::new(&h);
+    let h = hierarchy(&problem);
+    let finest = finest::<Pair>(&problem, &h);
+    let mut levels = levels::<Pair>(&h);
     let load = |p: usize, i: usize| problem.loads[i].nodal[h.vertex[p] as usize];
     let values = Vectors {
         x: vec![[0.0; 2]; h.len()],
@@ -379,7 +392,7 @@ fn gaps_that_a_monotone_cycle_closes_are_closed_exactly() {
         plain: false,
     };
     let scale = |_: usize| 0.0;
-    let mut descent = Descent::new(&h, &finest, &mut levels, &matrices, true, &scale, values);
+    let mut descent = Descent::new(&h, &finest, &mut levels, true, &scale, values);
     descent.settle();
     descent.monotone_start().unwrap();
     let size = descent.x.iter().map(|&u| Pair::size(u)).fold(0.0, f64::max);

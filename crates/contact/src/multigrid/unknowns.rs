@@ -8,7 +8,7 @@
 pub(crate) const EMPTY: f64 = 1e-9;
 
 /// Arithmetic of the unknowns of a vertex. Couplings are blocks of the matrix whose row is the younger vertex.
-pub(crate) trait Unknowns {
+pub(crate) trait Unknowns: Copy + Default {
     /// Numbers at a vertex.
     const WIDTH: usize;
     /// Values at a vertex.
@@ -35,6 +35,10 @@ pub(crate) trait Unknowns {
     fn plus(x: Self::Value, t: f64, y: Self::Value) -> Self::Value;
     /// x . y.
     fn dot(x: Self::Value, y: Self::Value) -> f64;
+    /// t A of an untruncated entry A.
+    fn plain_times(t: f64, a: Self::Plain) -> Self::Plain;
+    /// A + t B of untruncated entries.
+    fn plain_plus(a: Self::Plain, t: f64, b: Self::Plain) -> Self::Plain;
     /// x + A y with an untruncated entry A.
     fn plus_plain(x: Self::Value, a: Self::Plain, y: Self::Value) -> Self::Value;
     /// x - C y.
@@ -83,6 +87,7 @@ pub(crate) trait Unknowns {
 }
 
 /// One field: the gap, the mean, or sigma.
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Scalar;
 
 impl Unknowns for Scalar {
@@ -119,6 +124,14 @@ impl Unknowns for Scalar {
     #[inline]
     fn dot(x: f64, y: f64) -> f64 {
         x * y
+    }
+    #[inline]
+    fn plain_times(t: f64, a: f64) -> f64 {
+        t * a
+    }
+    #[inline]
+    fn plain_plus(a: f64, t: f64, b: f64) -> f64 {
+        a + t * b
     }
     #[inline]
     fn plus_plain(x: f64, a: f64, y: f64) -> f64 {
@@ -219,6 +232,7 @@ impl Unknowns for Scalar {
 }
 
 /// Two fields: the displacements of both membranes. A symmetric block is stored as (11, 12, 22).
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Pair;
 
 impl Unknowns for Pair {
@@ -255,6 +269,14 @@ impl Unknowns for Pair {
     #[inline]
     fn dot(x: [f64; 2], y: [f64; 2]) -> f64 {
         x[0] * y[0] + x[1] * y[1]
+    }
+    #[inline]
+    fn plain_times(t: f64, a: [f64; 2]) -> [f64; 2] {
+        [t * a[0], t * a[1]]
+    }
+    #[inline]
+    fn plain_plus(a: [f64; 2], t: f64, b: [f64; 2]) -> [f64; 2] {
+        [a[0] + t * b[0], a[1] + t * b[1]]
     }
     #[inline]
     fn plus_plain(x: [f64; 2], a: [f64; 2], y: [f64; 2]) -> [f64; 2] {

@@ -13,7 +13,7 @@ fn assert_same_contact(problem: &DiscreteProblem, a: &Solution, b: &Solution) {
             let pressed = s.force[j] / problem.harmonic_diagonal(j);
             s.gap(j).max(pressed) > 1e-12 * unit
         };
-        if !problem.boundary[j] && strict(a) && strict(b) {
+        if !problem.boundary()[j] && strict(a) && strict(b) {
             assert_eq!(a.contact[j], b.contact[j], "vertex {j}");
         }
     }
@@ -26,11 +26,11 @@ fn largest(values: &[f64]) -> f64 {
 /// |K sigma - z| over |z|, Euclidean norms, and what rounding of K sigma alone makes of it.
 fn riesz_residual(problem: &DiscreteProblem, s: &Solution) -> (f64, f64) {
     let (mut rest, mut size, mut rounding) = (0.0, 0.0, 0.0);
-    for j in (0..problem.order()).filter(|&j| !problem.boundary[j]) {
-        let r = s.force[j] - problem.laplacian.row_dot(j, &s.sigma);
+    for j in (0..problem.order()).filter(|&j| !problem.boundary()[j]) {
+        let r = s.force[j] - problem.laplacian().row_dot(j, &s.sigma);
         rest += r * r;
         size += s.force[j] * s.force[j];
-        rounding += problem.laplacian.row_dot_abs(j, &s.sigma).powi(2);
+        rounding += problem.laplacian().row_dot_abs(j, &s.sigma).powi(2);
     }
     if size == 0.0 {
         return (rest, 0.0);
@@ -49,9 +49,13 @@ fn compare(data: &Data, corner: bool, reduce: bool) {
         let s = solve(problem, &settings, stage.start).expect("a solution");
         assert_eq!(s.info.solver, "multigrid", "{:?}", s.info);
         assert_exact(problem, &s);
-        assert_eq!(
-            s.info.kkt_residual,
-            kkt_residual(problem, &s.displacement, &s.force)
+        // Measured on the slots of the hierarchy; here on rows, so that rounding differs.
+        let by_rows = kkt_residual(problem, &s.displacement, &s.force);
+        let apart = (s.info.kkt_residual - by_rows).abs();
+        assert!(
+            apart <= 1e-15 + 1e-3 * by_rows,
+            "{:e} {by_rows:e}",
+            s.info.kkt_residual
         );
         let by = |solver: Solver| {
             let settings = Settings {

@@ -164,7 +164,7 @@ pub fn energy_difference(problem: &DiscreteProblem, a: &Solution, b: &Solution) 
             .zip(&b.displacement[i])
             .map(|(x, y)| x - y)
             .collect();
-        problem.stiffness[i].quadratic(&e)
+        problem.stiffness(i).quadratic(&e)
     };
     (part(0) + part(1)).max(0.0).sqrt()
 }

@@ -217,7 +217,7 @@ fn nothing_to_iterate_on() {
         let problem = PRESSED.on(&mesh);
         let s = solve(&problem, &settings, None).expect("a solution");
         assert_exact(&problem, &s);
-        if problem.boundary.contains(&false) {
+        if problem.boundary().contains(&false) {
             assert_eq!(s.info.solver, "multigrid");
             interior += 1;
         } else {

@@ -195,7 +195,13 @@ fn a_level_is_continued_where_it_was_left() {
         without.sigma = false;
         let mut later = solve(stage.problem, &without, Some(&again)).expect("a solution");
         assert_eq!(later.displacement, exact.displacement);
-        add_sigma(stage.problem, &tight, &mut later).expect("sigma");
+        add_sigma(
+            stage.problem,
+            &tight,
+            &mut later,
+            &mut contact::Workspace::default(),
+        )
+        .expect("sigma");
         let largest = exact.sigma.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         for (a, b) in later.sigma.iter().zip(&exact.sigma) {
             assert!((a - b).abs() <= 1e-10 * largest);

@@ -42,7 +42,7 @@ impl Reference {
                 .collect()
         });
         let mean = [0, 1].map(|i: usize| quadrature::means(&mesh, tension[i].as_ref()));
-        let problem = DiscreteProblem::new(&mesh, mean, loads, heights);
+        let problem = DiscreteProblem::new(mesh.clone(), mean, loads, heights);
         let force = numbers(&values["z"]);
         let solution = Solution {
             contact: force.iter().map(|&z| z > 0.0).collect(),
