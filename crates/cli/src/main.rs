@@ -14,6 +14,9 @@ use std::process::ExitCode;
 use args::Task;
 use failure::Failure;
 
+#[global_allocator]
+static ALLOCATOR: memory::HugePages = memory::HugePages;
+
 fn main() -> ExitCode {
     failure::report_panics();
     let task = match args::parse(std::env::args_os()) {
