@@ -6,7 +6,9 @@ use contact::{DiscreteProblem, Solution, Start, Tolerance};
 use estimate::{Grade, Moments};
 use fem_core::{Mesh, TriangleId};
 
-use crate::discretise::{discretise, discretise_with_moments};
+use crate::discretise::{
+    Before, DataError, discretise, discretise_carried, discretise_with_moments,
+};
 use crate::estimates::Estimates;
 use crate::output::memory::peak_memory_mb;
 use crate::problem::Problem;
@@ -55,7 +57,8 @@ impl Level {
     /// Solves and estimates on the initial mesh.
     pub(crate) fn initial(context: Context<'_>) -> Result<Level, LevelError> {
         let mesh = context.problem.mesh.clone();
-        Level::on(mesh, context, None, 0, 0.0)
+        let discrete = |mesh: &Mesh| discretise(context.problem, mesh);
+        Level::on(mesh, context, discrete, None, 0, 0.0)
     }
 
     /// Refines the marked triangles, carries the solution over, solves and estimates.
@@ -77,14 +80,21 @@ impl Level {
         let growth = self.mesh.vertex_count() as f64 / mesh.vertex_count() as f64;
         let expected = self.estimates.error_size.map(|size| size * growth.sqrt());
         let seconds = clock.elapsed().as_secs_f64();
-        let before = Some((carried, expected));
-        Level::on(mesh, context, before, self.number + 1, seconds)
+        let start = Some((carried, expected));
+        let before = Before {
+            discrete: &self.discrete,
+            parent: &refinement.parent,
+        };
+        let discrete = |mesh: &Mesh| discretise_carried(context.problem, mesh, before);
+        Level::on(mesh, context, discrete, start, self.number + 1, seconds)
     }
 
-    /// Solves and estimates on a mesh; `before` is the solution carried over from the level before and the error to be expected.
+    /// Solves and estimates on a mesh; `discrete` finds the discrete problem where the certificate is not wanted, `before` is the solution carried over
+    /// from the level before and the error to be expected.
     fn on(
         mesh: Mesh,
         context: Context<'_>,
+        discrete: impl FnOnce(&Mesh) -> Result<DiscreteProblem, DataError>,
         before: Option<(Start, Option<f64>)>,
         number: usize,
         seconds_refine: f64,
@@ -97,7 +107,7 @@ impl Level {
             let (discrete, moments) = discretise_with_moments(problem, &mesh)?;
             (discrete, Some(moments))
         } else {
-            (discretise(problem, &mesh)?, None)
+            (discrete(&mesh)?, None)
         };
         let seconds_assemble = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
