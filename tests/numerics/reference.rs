@@ -62,11 +62,14 @@ impl Reference {
                     .map(|&v| times_power_of_two(v, -e))
                     .collect()
             };
-            discrete.loads[i] = Loads {
-                nodal: scaled(format!("load{k}"), scale.force()),
-                mean: scaled(format!("f{k}_mean"), scale.load),
-                deviation_squared: discrete.loads[i].deviation_squared.clone(),
-            };
+            let deviation: Vec<f64> = (0..problem.mesh.triangle_count())
+                .map(|t| discrete.loads[i].deviation_squared(t))
+                .collect();
+            discrete.loads[i] = Loads::from_parts(
+                scaled(format!("load{k}"), scale.force()),
+                &scaled(format!("f{k}_mean"), scale.load),
+                &deviation,
+            );
         }
         discrete
     }

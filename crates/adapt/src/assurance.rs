@@ -2,7 +2,7 @@
 
 use estimate::{BoundaryOscillation, Certificate, boundary_oscillation};
 use fem_core::scale::times_power_of_two;
-use fem_core::{Circle, FieldError, Mesh};
+use fem_core::{Circle, ElementValues, FieldError, Mesh};
 
 use crate::problem::Problem;
 
@@ -22,7 +22,7 @@ impl Assurance {
     /// A height that is not finite.
     pub fn of(
         mesh: &Mesh,
-        tension_mean: &[Vec<f64>; 2],
+        tension_mean: &[ElementValues; 2],
         problem: &Problem,
         certificate: &Certificate,
     ) -> Result<Assurance, FieldError> {

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use contact::DiscreteProblem;
 use estimate::Moments;
-use fem_core::integrate::{Loads, load_pair, means};
-use fem_core::{Field, FieldError, Mesh, Samples};
+use fem_core::integrate::{
+    Loads, Reference, load_pair_carried, load_pair_relative_to, means, means_carried,
+};
+use fem_core::{Field, FieldError, Mesh, Samples, TriangleId};
 
 use crate::problem::Problem;
 
@@ -41,13 +43,38 @@ pub enum DataError {
     },
 }
 
+/// The discrete problem on the mesh that another one was refined from, and how.
+#[derive(Clone, Copy)]
+pub struct Before<'a> {
+    /// On the mesh before; found for the same problem.
+    pub discrete: &'a DiscreteProblem,
+    /// The parent of every triangle, see [`fem_core::Refinement`].
+    pub parent: &'a [TriangleId],
+}
+
 /// Integrates the data and assembles the matrices on a mesh.
 ///
 /// # Errors
 /// [`DataError`] where data are not finite, a tension is not positive, or g1 < g2.
 pub fn discretise(problem: &Problem, mesh: &Arc<Mesh>) -> Result<DiscreteProblem, DataError> {
-    let loads = || load_pair(mesh, [&*problem.load[0], &*problem.load[1]]);
-    let (discrete, ()) = assemble(problem, mesh, || Ok((loads()?, ())))?;
+    let load = [&*problem.load[0], &*problem.load[1]];
+    let loads = || load_pair_relative_to(&Reference::of(&problem.mesh, load)?, mesh, load);
+    let (discrete, ()) = assemble(problem, mesh, None, || Ok((loads()?, ())))?;
+    Ok(discrete)
+}
+
+/// The same for a refined mesh, bit for bit: data are sampled on the triangles that are new.
+///
+/// # Errors
+/// As [`discretise`].
+pub fn discretise_carried(
+    problem: &Problem,
+    mesh: &Arc<Mesh>,
+    before: Before<'_>,
+) -> Result<DiscreteProblem, DataError> {
+    let load = [&*problem.load[0], &*problem.load[1]];
+    let loads = || load_pair_carried(mesh, load, &before.discrete.loads, before.parent);
+    let (discrete, ()) = assemble(problem, mesh, Some(before), || Ok((loads()?, ())))?;
     Ok(discrete)
 }
 
@@ -59,10 +86,11 @@ pub fn discretise_with_moments(
     problem: &Problem,
     mesh: &Arc<Mesh>,
 ) -> Result<(DiscreteProblem, Moments), DataError> {
-    assemble(problem, mesh, || {
+    assemble(problem, mesh, None, || {
         let load = [&*problem.load[0], &*problem.load[1]];
         let tension = [&*problem.tension[0], &*problem.tension[1]];
-        let moments = Moments::of(mesh, load, tension)?;
+        let reference = Reference::of(&problem.mesh, load)?;
+        let moments = Moments::relative_to(&reference, mesh, load, tension)?;
         Ok((moments.loads(mesh), moments))
     })
 }
@@ -70,15 +98,21 @@ pub fn discretise_with_moments(
 fn assemble<T>(
     problem: &Problem,
     mesh: &Arc<Mesh>,
+    before: Option<Before<'_>>,
     loads: impl FnOnce() -> Result<([Loads; 2], T), FieldError>,
 ) -> Result<(DiscreteProblem, T), DataError> {
     let physical = |v: f64| fem_core::scale::times_power_of_two(v, problem.scale.length);
-    let tension = [
-        means(mesh, &*problem.tension[0])?,
-        means(mesh, &*problem.tension[1])?,
-    ];
+    let mean = |i: usize| {
+        let field = &*problem.tension[i];
+        match before {
+            Some(b) => means_carried(mesh, field, &b.discrete.tension_mean[i], b.parent),
+            None => means(mesh, field),
+        }
+    };
+    let tension = [mean(0)?, mean(1)?];
     for (mean, membrane) in tension.iter().zip(["upper", "lower"]) {
-        if let Some(t) = mean.iter().position(|m| m.is_nan() || *m <= 0.0) {
+        let wrong = |m: &f64| m.is_nan() || *m <= 0.0;
+        if let Some(t) = mean.stored().iter().position(wrong) {
             let c = mesh.corners(fem_core::TriangleId(t as u32));
             let centre = [0, 1].map(|k| physical((c[0][k] + c[1][k] + c[2][k]) / 3.0));
             return Err(DataError::Tension {

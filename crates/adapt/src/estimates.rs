@@ -101,7 +101,7 @@ impl Estimates {
                 }
                 let h = mesh.shape(TriangleId(t as u32)).diameter();
                 let part = |i: usize| {
-                    discrete.loads[i].deviation_squared[t]
+                    discrete.loads[i].deviation_squared(t)
                         / tension_weight(discrete, i, t, weighted)
                 };
                 h * h * (part(0) + part(1))
@@ -129,7 +129,7 @@ impl Estimates {
             let shape = mesh.shape(t);
             let weight = shape.diameter().powi(2) * shape.area;
             let square = [0, 1].map(|i| {
-                let mean = discrete.loads[i].mean[t.index()];
+                let mean = discrete.loads[i].mean(t.index());
                 weight * mean * mean / tension_weight(discrete, i, t.index(), weighted)
             });
             largest = largest.max(square[0] + square[1]);

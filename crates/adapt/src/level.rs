@@ -7,7 +7,9 @@ use contact::{DiscreteProblem, Solution, Start, Tolerance, Workspace};
 use estimate::{Grade, Moments};
 use fem_core::{Mesh, TriangleId};
 
-use crate::discretise::{discretise, discretise_with_moments};
+use crate::discretise::{
+    Before, DataError, discretise, discretise_carried, discretise_with_moments,
+};
 use crate::estimates::Estimates;
 use crate::output::memory::peak_memory_mb;
 use crate::problem::Problem;
@@ -59,7 +61,8 @@ impl Level {
         workspace: &mut Workspace,
     ) -> Result<Level, LevelError> {
         let mesh = Arc::new(context.problem.mesh.clone());
-        Level::on(mesh, context, None, 0, 0.0, workspace)
+        let discrete = |mesh: &Arc<Mesh>| discretise(context.problem, mesh);
+        Level::on(mesh, context, discrete, None, 0, 0.0, workspace)
     }
 
     /// Refines the marked triangles, carries the solution over, solves and estimates.
@@ -82,21 +85,23 @@ impl Level {
         let growth = self.mesh.vertex_count() as f64 / mesh.vertex_count() as f64;
         let expected = self.estimates.error_size.map(|size| size * growth.sqrt());
         let seconds = clock.elapsed().as_secs_f64();
-        let before = Some((carried, expected));
-        Level::on(
-            Arc::new(mesh),
-            context,
-            before,
-            self.number + 1,
-            seconds,
-            workspace,
-        )
+        let start = Some((carried, expected));
+        let before = Before {
+            discrete: &self.discrete,
+            parent: &refinement.parent,
+        };
+        let discrete = |mesh: &Arc<Mesh>| discretise_carried(context.problem, mesh, before);
+        let number = self.number + 1;
+        let mesh = Arc::new(mesh);
+        Level::on(mesh, context, discrete, start, number, seconds, workspace)
     }
 
-    /// Solves and estimates on a mesh; `before` is the solution carried over from the level before and the error to be expected.
+    /// Solves and estimates on a mesh; `discrete` finds the discrete problem where the certificate is not wanted, `before` is the solution carried over
+    /// from the level before and the error to be expected.
     fn on(
         mesh: Arc<Mesh>,
         context: Context<'_>,
+        discrete: impl FnOnce(&Arc<Mesh>) -> Result<DiscreteProblem, DataError>,
         before: Option<(Start, Option<f64>)>,
         number: usize,
         seconds_refine: f64,
@@ -110,7 +115,7 @@ impl Level {
             let (discrete, moments) = discretise_with_moments(problem, &mesh)?;
             (discrete, Some(moments))
         } else {
-            (discretise(problem, &mesh)?, None)
+            (discrete(&mesh)?, None)
         };
         let seconds_assemble = clock.elapsed().as_secs_f64();
         let clock = Instant::now();

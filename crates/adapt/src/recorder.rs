@@ -191,6 +191,10 @@ pub fn fields(level: &Level, scale: Scale) -> LevelFields<'_> {
     let action: Vec<f64> = (0..count)
         .map(|j| times_power_of_two(solution.force[j] / discrete.dual_area[j], scale.load))
         .collect();
+    let mean = |i: usize| -> Vec<f64> {
+        let all = 0..level.mesh.triangle_count();
+        all.map(|t| discrete.loads[i].mean(t)).collect()
+    };
     let paper = estimates.paper.as_ref();
     LevelFields {
         level: level.number,
@@ -215,8 +219,8 @@ pub fn fields(level: &Level, scale: Scale) -> LevelFields<'_> {
             .as_ref()
             .map(|c| by(&c.local, scale.energy_norm())),
         oscillation: Some(by(&estimates.oscillation, scale.force())),
-        f1_h: by(&discrete.loads[0].mean, scale.load),
-        f2_h: by(&discrete.loads[1].mean, scale.load),
+        f1_h: Cow::Owned(by(&mean(0), scale.load).into_owned()),
+        f2_h: Cow::Owned(by(&mean(1), scale.load).into_owned()),
         generation: Cow::Borrowed(level.mesh.generation()),
         region: Cow::Borrowed(level.mesh.region()),
     }

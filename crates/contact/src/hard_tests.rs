@@ -216,12 +216,10 @@ fn random_problem(seed: u64, n: usize, strength: f64, kind: usize) -> DiscretePr
     let scales = [1.0, ratio];
     let loads = [0, 1].map(|i| {
         let lean = if i == 0 { bias } else { -bias };
-        Loads {
-            nodal: (0..mesh.vertex_count())
-                .map(|_| scales[i] * (random.between(-1.0, 1.0) + lean))
-                .collect(),
-            ..Loads::default()
-        }
+        let nodal = (0..mesh.vertex_count())
+            .map(|_| scales[i] * (random.between(-1.0, 1.0) + lean))
+            .collect();
+        Loads::from_parts(nodal, &[], &[])
     });
     DiscreteProblem::new(mesh, tension, loads, heights)
 }

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use fem_core::assemble::{dual_areas, stiffness};
 use fem_core::integrate::Loads;
-use fem_core::{Mesh, Pattern, SymmetricMatrix};
+use fem_core::{ElementValues, Mesh, Pattern, SymmetricMatrix};
 
 /// What the two tensions have in common; decides how far the problem reduces.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -27,8 +27,8 @@ pub enum Tensions {
 pub struct DiscreteProblem {
     /// The mesh.
     pub mesh: Arc<Mesh>,
-    /// Element means of the tensions, one entry a triangle.
-    pub tension_mean: [Vec<f64>; 2],
+    /// Element means of the tensions.
+    pub tension_mean: [ElementValues; 2],
     /// What the tensions have in common.
     pub tensions: Tensions,
     /// Load vectors and element means.
@@ -51,14 +51,15 @@ struct Matrices {
 impl DiscreteProblem {
     /// The discrete problem on a mesh; O(N).
     ///
-    /// `tension_mean` holds one positive value a triangle and membrane, `heights` one a vertex with `heights[0] >= heights[1]`.
+    /// `tension_mean` holds positive values for each membrane, `heights` one a vertex with `heights[0] >= heights[1]`.
     pub fn new(
         mesh: impl Into<Arc<Mesh>>,
-        tension_mean: [Vec<f64>; 2],
+        tension_mean: [impl Into<ElementValues>; 2],
         loads: [Loads; 2],
         heights: [Vec<f64>; 2],
     ) -> DiscreteProblem {
         let mesh = mesh.into();
+        let tension_mean = tension_mean.map(Into::into);
         DiscreteProblem {
             tensions: Tensions::of(&tension_mean),
             tension_mean,
@@ -123,19 +124,19 @@ impl DiscreteProblem {
 }
 
 impl Tensions {
-    fn of(mean: &[Vec<f64>; 2]) -> Tensions {
-        let (Some(&m1), Some(&m2)) = (mean[0].first(), mean[1].first()) else {
+    /// Looks at the values that are stored: O(1) for constants.
+    fn of(mean: &[ElementValues; 2]) -> Tensions {
+        let [upper, lower] = mean.each_ref().map(ElementValues::stored);
+        let (Some(&m1), Some(&m2)) = (upper.first(), lower.first()) else {
             return Tensions::General;
         };
-        if mean[0].iter().all(|&m| m == m1) && mean[1].iter().all(|&m| m == m2) {
+        if upper.iter().all(|&m| m == m1) && lower.iter().all(|&m| m == m2) {
             return Tensions::Constant(m1, m2);
         }
         let ratio = m2 / m1;
         // Means of proportional expressions agree to rounding and to the tolerance of their quadrature, no better.
-        let same = mean[0]
-            .iter()
-            .zip(&mean[1])
-            .all(|(a, b)| ((b / a) / ratio - 1.0).abs() <= RATIO_TOLERANCE);
+        let same = (0..upper.len().max(lower.len()))
+            .all(|t| ((mean[1][t] / mean[0][t]) / ratio - 1.0).abs() <= RATIO_TOLERANCE);
         if same {
             Tensions::Ratio(ratio)
         } else {

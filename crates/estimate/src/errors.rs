@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use fem_core::integrate::{Control, Integrand, Judgement, Piece, integrate, squared_error};
 use fem_core::quadrature::{POINTS, affine_misfit};
-use fem_core::{Field, FieldError, Mesh, Samples};
+use fem_core::{ElementValues, Field, FieldError, Mesh, Samples};
 
 use crate::exact::{Exact, Gradient};
 use crate::gradients::gradients;
@@ -48,7 +48,7 @@ pub struct TrueErrors {
 /// A value of an exact gradient or a tension that is not finite.
 pub fn true_errors(
     mesh: &Mesh,
-    tension_mean: &[Vec<f64>; 2],
+    tension_mean: &[ElementValues; 2],
     displacement: &[Vec<f64>; 2],
     sigma: &[f64],
     exact: &Exact,
@@ -68,7 +68,7 @@ pub fn true_errors(
             None => {
                 let field = tension[i].as_ref();
                 let result = error(Weight::Judged(field))?;
-                if spread(&tension_mean[i]) <= LARGEST_SPREAD {
+                if spread(tension_mean[i].stored()) <= LARGEST_SPREAD {
                     (result.plain, result.weighted)
                 } else {
                     // Where the tension is small the energy hardly sees the displacement: that needs its own points.

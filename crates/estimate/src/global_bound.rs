@@ -69,9 +69,9 @@ pub fn global_bound(
     let area: Vec<f64> = mesh.triangle_ids().map(|t| mesh.shape(t).area).collect();
     let norm = |i: usize| {
         let load = &problem.loads[i];
-        let squares = load.mean.iter().zip(&area).zip(&load.deviation_squared);
-        squares
-            .map(|((mean, area), rest)| area * mean * mean + rest)
+        area.iter()
+            .enumerate()
+            .map(|(t, area)| area * load.mean(t) * load.mean(t) + load.deviation_squared(t))
             .sum::<f64>()
             .sqrt()
     };
@@ -119,7 +119,7 @@ fn force_times_gap(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{close, four_triangles, problem, solution};
+    use crate::testing::{close, deviating, four_triangles, problem, solution};
     use crate::{oscillation, paper};
 
     fn terms() -> GlobalBound {
@@ -127,7 +127,7 @@ mod tests {
         // (1, -1) = -2. The gap is 1/2 at corner 1, so its mean over the patch of the centre is (2/3 of 1/2)/4.
         let mesh = four_triangles();
         let mut problem = problem(&mesh, [vec![1.0; 4], vec![1.0; 4]], [3.0, -4.0]);
-        problem.loads[1].deviation_squared = vec![9.0, 0.0, 0.0, 0.0];
+        problem.loads[1] = deviating(&problem.loads[1], &[9.0, 0.0, 0.0, 0.0]);
         let solution = solution(
             [vec![0.0, 0.5, 0.0, 0.0, 0.0], vec![0.0; 5]],
             vec![0.0, 0.0, 0.0, 0.0, 12.0],

@@ -46,7 +46,8 @@ pub fn paper(mesh: &Mesh, problem: &DiscreteProblem, solution: &Solution) -> Pap
     // The fluxes mu_1 grad u_1h - grad sigma_h and mu_2 grad u_2h + grad sigma_h.
     let flux = [(0, -1.0), (1, 1.0)].map(|(i, sign): (usize, f64)| {
         let mut flux = gradients(mesh, &solution.displacement[i]);
-        for ((q, s), mu) in flux.iter_mut().zip(&sigma).zip(&problem.tension_mean[i]) {
+        for (t, (q, s)) in flux.iter_mut().zip(&sigma).enumerate() {
+            let mu = problem.tension_mean[i][t];
             *q = [mu * q[0] + sign * s[0], mu * q[1] + sign * s[1]];
         }
         flux
@@ -56,7 +57,7 @@ pub fn paper(mesh: &Mesh, problem: &DiscreteProblem, solution: &Solution) -> Pap
         .enumerate()
         .map(|(t, id)| {
             let shape = mesh.shape(id);
-            let load: f64 = problem.loads.iter().map(|f| f.mean[t].abs()).sum();
+            let load: f64 = problem.loads.iter().map(|f| f.mean(t).abs()).sum();
             shape.diameter() * shape.area.sqrt() * load
         })
         .collect();

@@ -31,7 +31,7 @@ pub fn residual(mesh: &Mesh, problem: &DiscreteProblem, solution: &Solution) -> 
             let mut square =
                 contact_term(shape.area, v.map(|j| action[j]), v.map(|j| solution.gap(j)));
             for (i, sign) in [(0, 1.0), (1, -1.0)] {
-                let mean = problem.loads[i].mean[t];
+                let mean = problem.loads[i].mean(t);
                 let sum: f64 = v.iter().map(|&j| (mean + sign * action[j]).powi(2)).sum();
                 square += weight / problem.tension_mean[i][t] * sum;
             }
@@ -41,8 +41,8 @@ pub fn residual(mesh: &Mesh, problem: &DiscreteProblem, solution: &Solution) -> 
     for i in 0..2 {
         let mu = &problem.tension_mean[i];
         let mut flux = gradients(mesh, &solution.displacement[i]);
-        for (q, mu) in flux.iter_mut().zip(mu) {
-            *q = [mu * q[0], mu * q[1]];
+        for (t, q) in flux.iter_mut().enumerate() {
+            *q = [mu[t] * q[0], mu[t] * q[1]];
         }
         for edge in mesh.interior_edges() {
             let [k, l] = edge.triangles.map(|t| t.index());

@@ -25,14 +25,17 @@ pub(crate) fn four_triangles() -> Mesh {
 
 /// A problem with element means of the tensions and constant loads, clamped at height zero.
 pub(crate) fn problem(mesh: &Mesh, tension: [Vec<f64>; 2], load: [f64; 2]) -> DiscreteProblem {
-    let area = fem_core::assemble::dual_areas(mesh);
-    let loads = load.map(|f| Loads {
-        nodal: area.iter().map(|a| f * a).collect(),
-        mean: vec![f; mesh.triangle_count()],
-        deviation_squared: vec![0.0; mesh.triangle_count()],
-    });
-    let heights = [vec![0.0; area.len()], vec![0.0; area.len()]];
+    let loads = Loads::constant(mesh, load);
+    let heights = [0, 1].map(|_| vec![0.0; mesh.vertex_count()]);
     DiscreteProblem::new(mesh.clone(), tension, loads, heights)
+}
+
+/// The same load but for its squared deviations from the element means.
+pub(crate) fn deviating(loads: &Loads, deviation_squared: &[f64]) -> Loads {
+    let mean: Vec<f64> = (0..deviation_squared.len())
+        .map(|t| loads.mean(t))
+        .collect();
+    Loads::from_parts(loads.nodal.clone(), &mean, deviation_squared)
 }
 
 /// A solution with these nodal values.

@@ -44,7 +44,7 @@ pub fn stiffness(
 pub fn dual_areas(mesh: &Mesh) -> Vec<f64> {
     let mut area = vec![0.0; mesh.vertex_count()];
     for (t, id) in mesh.triangle_ids().enumerate() {
-        let third = mesh.shape(id).area / 3.0;
+        let third = mesh.area(id) / 3.0;
         for v in mesh.triangles()[t] {
             area[v.index()] += third;
         }

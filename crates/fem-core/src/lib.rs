@@ -9,6 +9,7 @@
 //! - [`invariants`]: the one checker that every mesh test ends with;
 //! - [`sparse`], [`assemble`]: sparsity pattern, symmetric matrices, stiffness;
 //! - [`field`], [`quadrature`], [`integrate`]: data given at points, and integrals of data that jump;
+//! - [`values`]: one value for every triangle, or the same for all;
 //! - [`norms`]: seminorms and areas.
 //!
 //! Every length, tension and load in here is a pure number of order one: the caller has taken
@@ -27,6 +28,7 @@ pub mod quadrature;
 pub mod scale;
 pub mod sparse;
 pub mod topology;
+pub mod values;
 
 pub use bisect::{Children, Refinement};
 pub use error::MeshError;
@@ -36,3 +38,4 @@ pub use mesh::{Circle, Mesh, Shape};
 pub use scale::Scale;
 pub use sparse::{Pattern, SymmetricMatrix};
 pub use topology::{Birth, InteriorEdge, Neighbour, Topology};
+pub use values::ElementValues;

@@ -249,6 +249,12 @@ impl Mesh {
         Shape::new(self.corners(t))
     }
 
+    /// Area of a triangle: the same bits as in its [`Shape`], which has roots and quotients besides.
+    #[inline]
+    pub fn area(&self, t: TriangleId) -> f64 {
+        signed_area(self.corners(t))
+    }
+
     /// Every triangle with its number.
     pub fn triangle_ids(&self) -> impl Iterator<Item = TriangleId> + use<> {
         (0..self.triangle_count() as u32).map(TriangleId)

@@ -4,7 +4,7 @@ use crate::mesh::Mesh;
 
 /// Area of the whole domain.
 pub fn area(mesh: &Mesh) -> f64 {
-    mesh.triangle_ids().map(|t| mesh.shape(t).area).sum()
+    mesh.triangle_ids().map(|t| mesh.area(t)).sum()
 }
 
 /// The square of the seminorm `|v|_1` of the first-order function with these nodal values, weighted by one coefficient a triangle.

@@ -1,7 +1,10 @@
 //! Loads and means of smooth, jumping and singular data.
 
-use fem_core::integrate::{loads, means};
-use fem_core::{Children, Constant, Field, FieldError, Mesh, Samples};
+use fem_core::integrate::{
+    Loads, Reference, load_pair, load_pair_carried, load_pair_relative_to, loads, means,
+    means_carried,
+};
+use fem_core::{Children, Circle, Constant, Field, FieldError, Mesh, Samples, TriangleId};
 
 fn square(refinements: usize) -> Mesh {
     let points = vec![[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
@@ -30,13 +33,15 @@ fn polynomials_are_integrated_exactly() {
         .sum();
     let exact = 3.0 * 4.0 / 5.0 + 2.0 * 4.0 - 4.0 / 9.0;
     assert!((paired - exact).abs() < 1e-14, "{paired} {exact}");
-    let squares: f64 = l.deviation_squared.iter().sum::<f64>();
+    let squares: f64 = (0..mesh.triangle_count())
+        .map(|t| l.deviation_squared(t))
+        .sum::<f64>();
     assert!(squares > 0.1);
     let c = loads(&mesh, &Constant(0.3)).expect("finite");
     assert!((total(&c.nodal) - 1.2).abs() < 1e-15);
-    assert!(c.deviation_squared.iter().all(|&d| d == 0.0));
+    assert!((0..mesh.triangle_count()).all(|t| c.deviation_squared(t) == 0.0));
     let c = loads(&mesh, &|_: f64, _: f64| 0.3).expect("finite");
-    assert!(c.deviation_squared.iter().all(|&d| d == 0.0) && c.mean.iter().all(|&m| m == 0.3));
+    assert!((0..mesh.triangle_count()).all(|t| c.deviation_squared(t) == 0.0 && c.mean(t) == 0.3));
 }
 
 #[test]
@@ -56,7 +61,7 @@ fn a_jump_inside_elements_is_followed() {
         let norm: f64 = mesh
             .triangle_ids()
             .map(|t| {
-                mesh.shape(t).area * l.mean[t.index()].powi(2) + l.deviation_squared[t.index()]
+                mesh.shape(t).area * l.mean(t.index()).powi(2) + l.deviation_squared(t.index())
             })
             .sum();
         assert!((norm - exact).abs() < 3e-4, "{level}: {}", norm - exact);
@@ -102,7 +107,7 @@ fn means_of_smooth_tensions_have_ten_digits() {
         whole / exact - 1.0
     );
     let aligned = means(&mesh, &|x: f64, _: f64| if x > 0.0 { 1e4 } else { 1.0 }).expect("finite");
-    assert!(aligned.iter().all(|&m| m == 1.0 || m == 1e4));
+    assert!(aligned.stored().iter().all(|&m| m == 1.0 || m == 1e4));
     let cut = means(&mesh, &|x: f64, _: f64| {
         if x > 1.0 / 3.0 { 1e4 } else { 1.0 }
     })
@@ -137,7 +142,10 @@ impl Field for Counting {
 fn smooth_data_on_a_fine_mesh_cost_seven_points() {
     let mesh = square(7);
     let f = Counting(0.into());
-    loads(&mesh, &f).expect("finite");
+    let fields: [&dyn Field; 2] = [&f, &Constant(0.0)];
+    let reference = Reference::of(&square(1), fields).expect("finite");
+    f.0.store(0, std::sync::atomic::Ordering::Relaxed);
+    load_pair_relative_to(&reference, &mesh, fields).expect("finite");
     assert_eq!(f.0.into_inner(), 7 * mesh.triangle_count());
 }
 
@@ -171,4 +179,115 @@ fn a_value_that_is_not_finite_says_where() {
     let error = loads(&square(3), &|x: f64, _: f64| 1.0 / (x - 0.5).max(0.0))
         .expect_err("infinite left of 0.5");
     assert!(error.value.is_infinite() && error.x <= 0.5, "{error}");
+}
+
+/// Refines some triangles, chosen by a generator, a dozen times, and shows every mesh with the parents of its triangles.
+fn refined(mut mesh: Mesh, mut look: impl FnMut(&Mesh, &[TriangleId])) {
+    let mut state = 7u64;
+    for round in 0..12 {
+        let mut random = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            state >> 33
+        };
+        // A few triangles of a large mesh, about half of a small one.
+        let some = 2 + mesh.triangle_count() as u64 / 64;
+        let marked: Vec<TriangleId> = mesh
+            .triangle_ids()
+            .filter(|_| random() % some == 0)
+            .collect();
+        let children = if round % 2 == 0 {
+            Children::Four
+        } else {
+            Children::Two
+        };
+        let refinement = mesh.refine(&marked, children).expect("refines");
+        look(&mesh, &refinement.parent);
+    }
+}
+
+#[test]
+fn data_carried_over_are_those_found_afresh() {
+    let points = vec![[-0.7, -0.7], [0.7, -0.7], [0.7, 0.7], [-0.7, 0.7]];
+    let circle = Circle {
+        center: [0.0, 0.0],
+        radius: 0.7 * 2f64.sqrt(),
+    };
+    let disk =
+        Mesh::new(points, &[[0, 1, 2], [0, 2, 3]], &[], Some(circle)).expect("a coarse disk");
+    let jump = |x: f64, y: f64| {
+        if x * x + y * y < 0.3 {
+            2.0 + x
+        } else {
+            -y.exp()
+        }
+    };
+    let smooth = |x: f64, y: f64| (3.0 * x).sin() * y;
+    let still = Constant(-1.5);
+    let pairs: [[&dyn Field; 2]; 3] = [[&jump, &smooth], [&still, &jump], [&still, &still]];
+    for fields in pairs {
+        let reference = Reference::of(&disk, fields).expect("finite");
+        let mut before = load_pair_relative_to(&reference, &disk, fields).expect("finite");
+        refined(disk.clone(), |mesh, parent| {
+            let carried = load_pair_carried(mesh, fields, &before, parent).expect("finite");
+            let fresh = load_pair_relative_to(&reference, mesh, fields).expect("finite");
+            for (carried, fresh) in carried.iter().zip(&fresh) {
+                assert_eq!(carried.nodal, fresh.nodal);
+                for t in mesh.triangle_ids() {
+                    let all = |l: &Loads| {
+                        let t = t.index();
+                        (l.mean(t), l.deviation_squared(t), l.moments(t, 1.0))
+                    };
+                    assert_eq!(all(carried), all(fresh), "{t:?}");
+                }
+            }
+            before = carried;
+        });
+    }
+    for field in pairs.as_flattened() {
+        let mut before = means(&disk, *field).expect("finite");
+        refined(disk.clone(), |mesh, parent| {
+            let carried = means_carried(mesh, *field, &before, parent).expect("finite");
+            assert_eq!(carried, means(mesh, *field).expect("finite"));
+            before = carried;
+        });
+    }
+}
+
+#[test]
+fn only_new_triangles_are_sampled() {
+    let mesh = square(7);
+    let f = Counting(0.into());
+    let fields: [&dyn Field; 2] = [&f, &Constant(1.0)];
+    let mut before = load_pair(&mesh, fields).expect("finite");
+    refined(mesh, |mesh, parent| {
+        f.0.store(0, std::sync::atomic::Ordering::Relaxed);
+        before = load_pair_carried(mesh, fields, &before, parent).expect("finite");
+        let bisected = |t: &usize| {
+            let same = |s: usize| parent.get(s) == Some(&parent[*t]);
+            same(t + 1) || (*t > 0 && same(t - 1))
+        };
+        let new = (0..mesh.triangle_count()).filter(bisected).count();
+        let samples = f.0.load(std::sync::atomic::Ordering::Relaxed);
+        // The last elements are sampled four at a time.
+        assert_eq!(samples, 7 * new.next_multiple_of(4));
+        assert!(new < mesh.triangle_count());
+    });
+}
+
+#[test]
+fn constants_are_stored_once() {
+    let mesh = square(3);
+    let [upper, lower] = load_pair(&mesh, [&Constant(2.0), &Constant(-0.5)]).expect("finite");
+    assert_eq!((upper.same(), lower.same()), (Some(2.0), Some(-0.5)));
+    assert_eq!((upper.mean(7), lower.deviation_squared(7)), (2.0, 0.0));
+    assert!((total(&upper.nodal) - 8.0).abs() < 1e-14);
+    let mixed = load_pair(&mesh, [&Constant(2.0), &|x: f64, _: f64| x]).expect("finite");
+    assert_eq!((mixed[0].same(), mixed[1].same()), (Some(2.0), None));
+    assert_eq!(mixed[0].nodal, upper.nodal);
+    assert_eq!(
+        means(&mesh, &Constant(3.0)).expect("finite").same(),
+        Some(3.0)
+    );
 }

@@ -96,7 +96,7 @@ pub(crate) fn certificate(
     }
     let load = [&*problem.load[0], &*problem.load[1]];
     let tension = [&*problem.tension[0], &*problem.tension[1]];
-    let moments = Moments::of(level.mesh, load, tension)?;
+    let moments = Moments::relative_to(&level.reference, level.mesh, load, tension)?;
     let given = Given {
         mesh: level.mesh,
         load,

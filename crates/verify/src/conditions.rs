@@ -84,7 +84,8 @@ pub(crate) fn kkt_residual(level: &Discrete<'_>) -> Number {
             .collect();
         let mut terms: Vec<f64> = (0..count).map(|j| load[j].abs() + level.force[j]).collect();
         let mut diagonal = vec![0.0; count];
-        for (e, mu) in level.elements.iter().zip(&level.tension[i]) {
+        for (t, e) in level.elements.iter().enumerate() {
+            let mu = level.tension[i][t];
             let weight = mu * e.area;
             let [gx, gy] = e.gradient(u);
             for (k, &j) in e.vertices.iter().enumerate() {

@@ -1,9 +1,9 @@
 //! The scene's data on the mesh of a level, and the discrete solution of its file, all scaled.
 
 use adapt::Problem;
-use fem_core::integrate::{Loads, load_pair, means};
+use fem_core::integrate::{Loads, Reference, load_pair_relative_to, means};
 use fem_core::scale::times_power_of_two;
-use fem_core::{Field, FieldError, Mesh, Samples, Scale};
+use fem_core::{ElementValues, Field, FieldError, Mesh, Samples, Scale};
 
 use crate::element::{Element, elements};
 
@@ -13,10 +13,12 @@ pub(crate) struct Discrete<'a> {
     pub mesh: &'a Mesh,
     /// The units.
     pub scale: Scale,
+    /// What the loads of elements are judged by.
+    pub reference: Reference,
     /// Its triangles.
     pub elements: Vec<Element>,
     /// Element means of the tensions.
-    pub tension: [Vec<f64>; 2],
+    pub tension: [ElementValues; 2],
     /// Nodal loads, element means, deviations from them.
     pub loads: [Loads; 2],
     /// Heights at boundary vertices; 0 inside.
@@ -58,18 +60,22 @@ impl<'a> Discrete<'a> {
                 dual_area[j] += e.area / 3.0;
             }
         }
+        // The run judged its elements by the loads on the initial mesh.
+        let load = [&*problem.load[0], &*problem.load[1]];
+        let reference = Reference::of(&problem.mesh, load)?;
         let pair = |fields: &[std::sync::Arc<dyn Field>; 2]| {
             Ok::<_, FieldError>([means(mesh, &*fields[0])?, means(mesh, &*fields[1])?])
         };
         Ok(Discrete {
             tension: pair(&problem.tension)?,
-            loads: load_pair(mesh, [&*problem.load[0], &*problem.load[1]])?,
+            loads: load_pair_relative_to(&reference, mesh, load)?,
             heights: [
                 heights(mesh, &*problem.height[0])?,
                 heights(mesh, &*problem.height[1])?,
             ],
             mesh,
             scale: problem.scale,
+            reference,
             elements,
             dual_area,
             displacement: nodal.displacement,

@@ -70,7 +70,7 @@ pub(crate) fn paper(level: &Discrete<'_>) -> Paper {
         },
     };
     for (t, e) in level.elements.iter().enumerate() {
-        let mean = level.loads[0].mean[t].abs() + level.loads[1].mean[t].abs();
+        let mean = level.loads[0].mean(t).abs() + level.loads[1].mean(t).abs();
         let load = e.diameter * e.area.sqrt() * mean;
         paper.eta_k.value.push(load);
         paper.eta_k.terms.push(load);
@@ -116,7 +116,7 @@ pub(crate) fn global_bound(
                 .elements
                 .iter()
                 .enumerate()
-                .map(|(t, e)| e.area * load.mean[t].powi(2) + load.deviation_squared[t]);
+                .map(|(t, e)| e.area * load.mean(t).powi(2) + load.deviation_squared(t));
             sum(squares).sqrt()
         })
         .sum();
@@ -160,7 +160,7 @@ pub(crate) fn residual(level: &Discrete<'_>) -> Local {
         let (mut square, mut size) = (0.0, 0.0);
         for (i, sign) in [(0, 1.0), (1, -1.0)] {
             let weight = e.diameter.powi(2) / level.tension[i][t] * e.area / 3.0;
-            let f = level.loads[i].mean[t];
+            let f = level.loads[i].mean(t);
             for j in e.vertices {
                 square += weight * (f + sign * action[j]).powi(2);
                 size += weight * (f.abs() + action[j].abs()).powi(2);
@@ -181,8 +181,8 @@ pub(crate) fn residual(level: &Discrete<'_>) -> Local {
         let flux: Vec<[f64; 2]> = level
             .elements
             .iter()
-            .zip(mu)
-            .map(|(e, mu)| e.gradient(&level.displacement[i]).map(|g| mu * g))
+            .enumerate()
+            .map(|(t, e)| e.gradient(&level.displacement[i]).map(|g| mu[t] * g))
             .collect();
         for edge in edges(level.mesh) {
             let [s, t] = edge.sides;
@@ -204,7 +204,7 @@ pub(crate) fn residual(level: &Discrete<'_>) -> Local {
 /// h_K (||f_1 - f_1h||_K^2 + ||f_2 - f_2h||_K^2)^(1/2), one a triangle.
 pub(crate) fn oscillation(level: &Discrete<'_>) -> Local {
     let value = (0..level.elements.len()).map(|t| {
-        let [a, b] = [0, 1].map(|i| level.loads[i].deviation_squared[t]);
+        let [a, b] = [0, 1].map(|i| level.loads[i].deviation_squared(t));
         level.elements[t].diameter * (a + b).sqrt()
     });
     Local {
@@ -217,7 +217,8 @@ pub(crate) fn oscillation(level: &Discrete<'_>) -> Local {
 pub(crate) fn energy(level: &Discrete<'_>, scale: Scale) -> (Number, Number) {
     let (mut squares, mut work, mut terms) = (Vec::new(), Vec::new(), 0.0);
     for i in 0..2 {
-        for (e, mu) in level.elements.iter().zip(&level.tension[i]) {
+        for (t, e) in level.elements.iter().enumerate() {
+            let mu = level.tension[i][t];
             let [x, y] = e.gradient(&level.displacement[i]);
             squares.push(mu * e.area * (x * x + y * y));
         }

@@ -188,7 +188,11 @@ impl LevelFile {
         let paper = level.paper.as_ref();
         let energy = scale.energy_norm();
         let certificate = level.certificate.as_ref();
-        let loads = &discrete.loads;
+        let means = discrete.loads.each_ref().map(|f| {
+            (0..discrete.elements.len())
+                .map(|t| f.mean(t))
+                .collect::<Vec<f64>>()
+        });
         let none: &[f64] = &[];
         for (claim, local, exponent) in [
             (
@@ -219,8 +223,8 @@ impl LevelFile {
                 Some((&level.oscillation.value[..], none)),
                 scale.force(),
             ),
-            ("f1_h", Some((&loads[0].mean[..], none)), scale.load),
-            ("f2_h", Some((&loads[1].mean[..], none)), scale.load),
+            ("f1_h", Some((&means[0][..], none)), scale.load),
+            ("f2_h", Some((&means[1][..], none)), scale.load),
         ] {
             match (fields.cell(claim), local) {
                 (Some(claimed), Some((recomputed, terms))) => {
@@ -319,9 +323,10 @@ pub(crate) fn reduction(level: &Recomputed<'_>) -> &'static str {
         return "full-contact";
     }
     let [a, b] = [&d.tension[0], &d.tension[1]];
+    let [a, b] = [a, b].map(|m| (0..d.elements.len()).map(|t| m[t]).collect::<Vec<f64>>());
     let constant = |m: &[f64]| m.iter().all(|&v| v == m[0]);
     let ratio = b[0] / a[0];
-    if constant(a) && constant(b) {
+    if constant(&a) && constant(&b) {
         "constant-tensions"
     } else if a
         .iter()
@@ -349,11 +354,11 @@ pub(crate) fn unseen(level: &Recomputed<'_>) -> Unseen {
     for (t, e) in d.elements.iter().enumerate() {
         let over = |i: usize, value: f64| value / level.weight(i, t);
         // The certificate sees everything.
-        let part = |i: usize| over(i, d.loads[i].deviation_squared[t]);
+        let part = |i: usize| over(i, d.loads[i].deviation_squared(t));
         if level.settings.estimate.estimator != Estimator::Certified {
             square += e.diameter.powi(2) * (part(0) + part(1));
         }
-        let mean = |i: usize| over(i, d.loads[i].mean[t].powi(2));
+        let mean = |i: usize| over(i, d.loads[i].mean(t).powi(2));
         squares.push(e.diameter.powi(2) * e.area * (mean(0) + mean(1)));
     }
     Unseen {

@@ -159,25 +159,20 @@ pub fn distorted(n: usize, strength: f64, seed: u64) -> Mesh {
 
 /// Loads by the vertex rule: (f, phi_j) is f at the vertex times the area of the dual cell.
 pub fn loads(mesh: &Mesh, f: Function) -> Loads {
-    let mut result = Loads {
-        nodal: vec![0.0; mesh.vertex_count()],
-        mean: Vec::new(),
-        deviation_squared: Vec::new(),
-    };
+    let mut nodal = vec![0.0; mesh.vertex_count()];
+    let mut means = Vec::new();
     for t in mesh.triangle_ids() {
         let shape = mesh.shape(t);
         let middle = [0, 1].map(|i| shape.corners.iter().map(|p| p[i]).sum::<f64>() / 3.0);
-        let mean = f(middle[0], middle[1]);
-        result.mean.push(mean);
-        result.deviation_squared.push(0.0);
+        means.push(f(middle[0], middle[1]));
         for v in mesh.triangles()[t.index()] {
             let p = mesh.points()[v.index()];
             // Inwards a little, so that data that jump along mesh edges are read on the triangle's side.
             let q = [0, 1].map(|i| p[i] + 1e-9 * (middle[i] - p[i]));
-            result.nodal[v.index()] += shape.area / 3.0 * f(q[0], q[1]);
+            nodal[v.index()] += shape.area / 3.0 * f(q[0], q[1]);
         }
     }
-    result
+    Loads::from_parts(nodal, &means, &vec![0.0; means.len()])
 }
 
 /// Data of a problem on any mesh.

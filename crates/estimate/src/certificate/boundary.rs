@@ -1,7 +1,7 @@
 //! What piecewise affine boundary values do not see of the boundary heights.
 
 use fem_core::quadrature::segment_rule;
-use fem_core::{Field, FieldError, Mesh, Samples};
+use fem_core::{ElementValues, Field, FieldError, Mesh, Samples};
 
 /// How far the boundary heights are from their interpolants along the edges of a mesh.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -23,7 +23,7 @@ const SPACINGS: f64 = 64.0;
 pub fn boundary_oscillation(
     mesh: &Mesh,
     heights: [&dyn Field; 2],
-    tension_mean: &[Vec<f64>; 2],
+    tension_mean: &[ElementValues; 2],
 ) -> Result<BoundaryOscillation, FieldError> {
     let rule = segment_rule();
     let (mut square, mut seen) = (0.0, false);

@@ -24,7 +24,7 @@ mod rt0;
 mod rt1;
 mod shares;
 
-use fem_core::{Field, FieldError, Mesh};
+use fem_core::{ElementValues, Field, FieldError, Mesh};
 
 pub use boundary::{BoundaryOscillation, boundary_oscillation};
 use misfit::{Norms, Reconstruction, norms};
@@ -55,7 +55,7 @@ pub struct Given<'a> {
     /// Moments of both.
     pub moments: &'a Moments,
     /// Means of the tensions over the elements.
-    pub tension_mean: &'a [Vec<f64>; 2],
+    pub tension_mean: &'a [ElementValues; 2],
     /// Displacements with u_1h >= u_2h at every vertex.
     pub displacement: &'a [Vec<f64>; 2],
     /// Action forces; what is negative counts as 0.

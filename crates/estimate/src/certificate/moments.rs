@@ -5,7 +5,7 @@
 //! what cancels between loads and action cancels between their moments too.
 
 use fem_core::integrate::{
-    Integrand, Judgement, LOAD_CONTROL, Loads, Piece, integrate, judge_load,
+    ElementLoad, Integrand, Judgement, LOAD_CONTROL, Loads, Piece, Reference, integrate, judge_load,
 };
 use fem_core::quadrature::affine_fit;
 use fem_core::{Field, FieldError, Mesh, Samples};
@@ -109,6 +109,8 @@ pub struct Moments {
     varied: Vec<bool>,
     /// A value of f_i in the element, and the first two moments of f_i minus that value.
     spread: [Vec<[f64; 3]>; 2],
+    /// What the elements are judged by.
+    reference: Reference,
 }
 
 /// Quotient of the largest and the smallest sample of a tension in an element that counts as a jump inside.
@@ -124,11 +126,25 @@ pub(super) fn contact_action(tension: [f64; 2], load: [f64; 2]) -> f64 {
 }
 
 impl Moments {
-    /// Integrates over all elements; O(N), and no samples where all data are constants.
+    /// Integrates over all elements of an initial mesh, see [`Moments::relative_to`].
     ///
     /// # Errors
     /// A value of a load or a tension that is not finite.
     pub fn of(
+        mesh: &Mesh,
+        load: [&dyn Field; 2],
+        tension: [&dyn Field; 2],
+    ) -> Result<Moments, FieldError> {
+        Moments::relative_to(&Reference::of(mesh, load)?, mesh, load, tension)
+    }
+
+    /// Integrates over all elements; O(N), and no samples where all data are constants. Elements are judged as those of
+    /// [`fem_core::integrate::load_pair_relative_to`].
+    ///
+    /// # Errors
+    /// A value of a load or a tension that is not finite.
+    pub fn relative_to(
+        reference: &Reference,
         mesh: &Mesh,
         load: [&dyn Field; 2],
         tension: [&dyn Field; 2],
@@ -144,6 +160,7 @@ impl Moments {
                 jumps: 0,
                 varied: Vec::new(),
                 spread: [Vec::new(), Vec::new()],
+                reference: *reference,
             });
         }
         let zeros = || Integrals::Each(vec![[0.0; 6]; count]);
@@ -160,6 +177,7 @@ impl Moments {
             jumps: 0,
             varied: vec![false; count],
             spread: [vec![[0.0; 3]; count], vec![[0.0; 3]; count]],
+            reference: *reference,
         };
         let range = varying.map(|v| vec![NOTHING; if v { count } else { 0 }]);
         let mut integrand = Sums {
@@ -196,30 +214,33 @@ impl Moments {
         !self.varied.contains(&true)
     }
 
-    /// The load vectors, means and deviations, as [`fem_core::integrate::load_pair`] finds them.
+    /// The load vectors, means and deviations, as [`fem_core::integrate::load_pair_relative_to`] finds them.
     pub fn loads(&self, mesh: &Mesh) -> [Loads; 2] {
         [0, 1].map(|i| {
-            let mut loads = Loads {
-                nodal: vec![0.0; mesh.vertex_count()],
-                mean: Vec::with_capacity(mesh.triangle_count()),
-                deviation_squared: Vec::with_capacity(mesh.triangle_count()),
-            };
-            for (t, id) in mesh.triangle_ids().enumerate() {
-                let area = mesh.shape(id).area;
-                for (k, v) in mesh.triangles()[t].iter().enumerate() {
-                    loads.nodal[v.index()] += self.load[i].hat(t, area, k);
+            let loads = match &self.load[i] {
+                Integrals::Constant(value) => {
+                    let [loads] = Loads::constant(mesh, [*value]);
+                    loads
                 }
-                let [base, first, second] = match &self.load[i] {
-                    Integrals::Constant(value) => [*value, 0.0, 0.0],
-                    Integrals::Each(_) => self.spread[i][t],
-                };
-                loads.mean.push(base + first / area);
-                loads
-                    .deviation_squared
-                    .push((second - first * first / area).max(0.0));
-            }
-            loads
+                Integrals::Each(_) => Loads::new(mesh, self.elements(mesh, i)),
+            };
+            loads.relative_to(self.reference)
         })
+    }
+
+    /// The integrals of a load over every triangle.
+    fn elements(&self, mesh: &Mesh, i: usize) -> Vec<ElementLoad> {
+        let element = |t: usize, area: f64| {
+            let [base, first, second] = self.spread[i][t];
+            ElementLoad {
+                corners: [0, 1].map(|k| self.load[i].hat(t, area, k)),
+                mean: base + first / area,
+                deviation_squared: (second - first * first / area).max(0.0),
+            }
+        };
+        mesh.triangle_ids()
+            .map(|id| element(id.index(), mesh.area(id)))
+            .collect()
     }
 }
 
@@ -239,6 +260,10 @@ struct Sums<'a> {
 const NOTHING: [f64; 2] = [f64::INFINITY, 0.0];
 
 impl Integrand for Sums<'_> {
+    fn reference(&self) -> Option<Reference> {
+        Some(self.moments.reference)
+    }
+
     fn components(&self) -> usize {
         4
     }

@@ -1,7 +1,7 @@
 //! The fluxes themselves: continuous normal components, divergence, and the norms in closed form against quadrature.
 
 use fem_core::quadrature::{POINTS, rule};
-use fem_core::{Children, Constant, Field, Mesh, TriangleId};
+use fem_core::{Children, Constant, ElementValues, Field, Mesh, TriangleId};
 
 use super::misfit::Reconstruction;
 use super::shares::Shares;
@@ -13,7 +13,7 @@ struct Case {
     mesh: Mesh,
     displacement: [Vec<f64>; 2],
     force: Vec<f64>,
-    tension_mean: [Vec<f64>; 2],
+    tension_mean: [ElementValues; 2],
 }
 
 fn case() -> Case {
@@ -31,14 +31,13 @@ fn case() -> Case {
         .zip(mesh.boundary())
         .map(|(p, &b)| if b { 0.0 } else { 0.3 + 0.2 * p[0] })
         .collect();
-    let count = mesh.triangle_count();
     Case {
         displacement: [
             value(|x, y| 0.5 + 0.3 * x - 0.2 * x * y),
             value(|x, y| 0.1 * x - 0.2 * y * y),
         ],
         force,
-        tension_mean: [vec![2.0; count], vec![0.5; count]],
+        tension_mean: [2.0, 0.5].map(ElementValues::Same),
         mesh,
     }
 }

@@ -28,10 +28,9 @@ impl Reference {
         let values: Value = serde_json::from_str(&text).unwrap();
         let (points, triangles) = read_msh(&read(&format!("{name}.msh")));
         let mesh = Mesh::new(points, &triangles, &[], None).unwrap();
-        let loads = [("load1", "f1_mean"), ("load2", "f2_mean")].map(|(nodal, mean)| Loads {
-            nodal: numbers(&values[nodal]),
-            mean: numbers(&values[mean]),
-            deviation_squared: vec![0.0; mesh.triangle_count()],
+        let loads = [("load1", "f1_mean"), ("load2", "f2_mean")].map(|(nodal, mean)| {
+            let mean = numbers(&values[mean]);
+            Loads::from_parts(numbers(&values[nodal]), &mean, &vec![0.0; mean.len()])
         });
         let displacement = [numbers(&values["u1"]), numbers(&values["u2"])];
         let heights = [0, 1].map(|i: usize| {

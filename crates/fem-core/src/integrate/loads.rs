@@ -1,20 +1,14 @@
-//! Loads and tensions: their moments over elements.
+//! Loads: their moments over elements.
 
-use super::{Control, Integrand, Judgement, Piece, integrate};
+use super::carry::kept;
+use super::whole::{self, Fit};
+use super::{
+    Allowed, Control, ElementLoad, Integrand, Judgement, Loads, Piece, Reference, Whole, divide,
+};
 use crate::field::{Constant, Field, FieldError, Samples};
+use crate::index::TriangleId;
 use crate::mesh::Mesh;
 use crate::quadrature::{POINTS, RulePoint, affine_misfit};
-
-/// Integrals of one load over a mesh.
-#[derive(Clone, Debug, Default)]
-pub struct Loads {
-    /// (f, phi_j) for every vertex, boundary included.
-    pub nodal: Vec<f64>,
-    /// Mean f_h of f over every triangle.
-    pub mean: Vec<f64>,
-    /// ||f - f_h||^2 over every triangle.
-    pub deviation_squared: Vec<f64>,
-}
 
 /// The tolerance of loads: a piece cut by a jump is quartered until its area is about this share of the domain.
 pub const LOAD_CONTROL: Control = Control {
@@ -22,14 +16,6 @@ pub const LOAD_CONTROL: Control = Control {
     local: false,
     depth: 14,
     largest_share: 1.0 / 16384.0,
-};
-
-/// Element means of tensions are wanted to ten digits where the tension is smooth.
-const MEAN_CONTROL: Control = Control {
-    tolerance: 1e-12,
-    local: true,
-    depth: 7,
-    largest_share: 2.0,
 };
 
 /// Size of the quadrature error that a misfit of samples of size `largest` points to, for a function itself.
@@ -71,68 +57,74 @@ pub fn loads(mesh: &Mesh, field: &dyn Field) -> Result<Loads, FieldError> {
     load_pair(mesh, [field, &Constant(0.0)]).map(|[loads, _]| loads)
 }
 
-/// Integrates two loads against the hat functions: nodal loads, element means and deviations from them.
-///
-/// Both are sampled at the same points, as many as either needs: what cancels between the loads then cancels between their integrals too.
+/// Integrates two loads on the initial mesh of a problem, see [`load_pair_relative_to`].
 ///
 /// # Errors
 /// A value of a field that is not finite.
 pub fn load_pair(mesh: &Mesh, fields: [&dyn Field; 2]) -> Result<[Loads; 2], FieldError> {
-    let count = mesh.triangle_count();
-    if let [Some(f), Some(g)] = fields.map(|f| f.constant()) {
-        return Ok([f, g].map(|f| constant_load(mesh, f)));
-    }
-    let none = || Moments {
-        sums: vec![[0.0; 5]; count],
-        base: vec![f64::NAN; count],
+    load_pair_relative_to(&Reference::of(mesh, fields)?, mesh, fields)
+}
+
+/// Integrates two loads against the hat functions: nodal loads, element means and deviations from them.
+///
+/// Both are sampled at the same points, as many as either needs: what cancels between the loads then cancels between their integrals too. The
+/// integrals over an element depend on the element and on `reference` alone.
+///
+/// # Errors
+/// A value of a field that is not finite.
+pub fn load_pair_relative_to(
+    reference: &Reference,
+    mesh: &Mesh,
+    fields: [&dyn Field; 2],
+) -> Result<[Loads; 2], FieldError> {
+    pair(reference, mesh, fields, |_| None)
+}
+
+/// The loads on a mesh made from another one by [`Mesh::refine`]: only the triangles that it bisected are sampled. The result is what
+/// [`load_pair_relative_to`] gives with the reference that the loads before were found by, bit for bit.
+///
+/// `before` holds the loads on the mesh before, `parent` is that of the [`crate::Refinement`].
+///
+/// # Errors
+/// A value of a field that is not finite.
+pub fn load_pair_carried(
+    mesh: &Mesh,
+    fields: [&dyn Field; 2],
+    before: &[Loads; 2],
+    parent: &[TriangleId],
+) -> Result<[Loads; 2], FieldError> {
+    let reference = match before[0].reference {
+        Some(reference) => reference,
+        None => Reference::of(mesh, fields)?,
     };
+    pair(&reference, mesh, fields, |t| {
+        kept(parent, t).map(|old| (before, old))
+    })
+}
+
+/// Integrates where `known` has nothing to be taken over: loads, and the number of the triangle in them.
+fn pair<'a>(
+    reference: &Reference,
+    mesh: &Mesh,
+    fields: [&dyn Field; 2],
+    known: impl Fn(usize) -> Option<(&'a [Loads; 2], usize)>,
+) -> Result<[Loads; 2], FieldError> {
+    let constants = fields.map(|f| f.constant());
+    if let [Some(f), Some(g)] = constants {
+        return Ok(Loads::constant(mesh, [f, g]).map(|l| l.relative_to(*reference)));
+    }
+    let count = mesh.triangle_count();
     let mut pair = LoadPair {
         fields,
-        moments: [none(), none()],
+        reference: *reference,
+        elements: [0, 1].map(|i| {
+            let room = if constants[i].is_some() { 0 } else { count };
+            Vec::with_capacity(room)
+        }),
+        sums: [Vec::new(), Vec::new()],
     };
-    integrate(mesh, LOAD_CONTROL, &mut pair)?;
-    let moments = pair.moments;
-    Ok([0, 1].map(|i| match fields[i].constant() {
-        Some(f) => constant_load(mesh, f),
-        None => moments[i].loads(mesh),
-    }))
-}
-
-fn constant_load(mesh: &Mesh, f: f64) -> Loads {
-    let count = mesh.triangle_count();
-    let mut moments = Moments {
-        sums: Vec::with_capacity(count),
-        base: vec![f; count],
-    };
-    for id in mesh.triangle_ids() {
-        let third = mesh.shape(id).area * f / 3.0;
-        moments.sums.push([third, third, third, 0.0, 0.0]);
-    }
-    moments.loads(mesh)
-}
-
-impl Moments {
-    fn loads(&self, mesh: &Mesh) -> Loads {
-        let count = mesh.triangle_count();
-        let moments = self;
-        let mut result = Loads {
-            nodal: vec![0.0; mesh.vertex_count()],
-            mean: Vec::with_capacity(count),
-            deviation_squared: Vec::with_capacity(count),
-        };
-        for (t, id) in mesh.triangle_ids().enumerate() {
-            let area = mesh.shape(id).area;
-            let [m0, m1, m2, d1, d2] = moments.sums[t];
-            for (v, m) in mesh.triangles()[t].iter().zip([m0, m1, m2]) {
-                result.nodal[v.index()] += m;
-            }
-            result.mean.push(moments.base[t] + d1 / area);
-            result
-                .deviation_squared
-                .push((d2 - d1 * d1 / area).max(0.0));
-        }
-        result
-    }
+    pair.fill(mesh, constants, known)?;
+    Ok(pair.finish(mesh, constants))
 }
 
 /// How one load is judged on a piece: by the misfit of its samples, for the integrals of [`load_pair`].
@@ -151,17 +143,114 @@ pub fn judge_load(piece: &Piece<'_>, component: usize) -> Judgement {
     }
 }
 
-/// Moments of one load in every element.
-struct Moments {
-    /// (f, phi_k) for the three corners, then the first and second moment of f minus the base value.
-    sums: Vec<[f64; 5]>,
-    /// A value of f in the element; taken out of the second moment so that it does not cancel.
-    base: Vec<f64>,
-}
-
+/// Two loads under way.
 struct LoadPair<'a> {
     fields: [&'a dyn Field; 2],
-    moments: [Moments; 2],
+    reference: Reference,
+    /// What is known of the triangles; nothing of a constant.
+    elements: [Vec<ElementLoad>; 2],
+    /// Of triangles that are divided: (f, phi_k) for the corners 0 and 1, then the first and second moment of f minus the mean that the seven points give, so
+    /// that the second one does not cancel.
+    sums: [Vec<[f64; 4]>; 2],
+}
+
+impl LoadPair<'_> {
+    /// Fills the elements: takes over, samples, and divides what seven points do not do for.
+    fn fill<'b>(
+        &mut self,
+        mesh: &Mesh,
+        constants: [Option<f64>; 2],
+        known: impl Fn(usize) -> Option<(&'b [Loads; 2], usize)>,
+    ) -> Result<(), FieldError> {
+        let count = mesh.triangle_count();
+        let mut fresh = Vec::new();
+        for t in 0..count {
+            let known = known(t);
+            if known.is_none() {
+                fresh.push(t as u32);
+            }
+            for (i, elements) in self.elements.iter_mut().enumerate() {
+                if constants[i].is_none() {
+                    elements.push(match known {
+                        Some((loads, old)) => loads[i].element(old),
+                        None => ElementLoad::NONE,
+                    });
+                }
+            }
+        }
+        let control = LOAD_CONTROL;
+        let allowed = Allowed {
+            control,
+            coarse: control.largest_share * self.reference.area,
+            whole: Whole::Same(self.reference.magnitude),
+        };
+        let mut wanting = Vec::new();
+        let elements = &mut self.elements;
+        let mut put = |t: usize, area: f64, loads: &[(usize, Fit)]| {
+            let mut errors = [0.0; 2];
+            for &(i, fit) in loads {
+                errors[i] = fit.error * area;
+                elements[i][t] = ElementLoad {
+                    corners: fit.corners.map(|m| m * area),
+                    mean: fit.mean,
+                    deviation_squared: fit.variance * area,
+                };
+            }
+            if area > allowed.coarse || allowed.too_large(t, errors) {
+                wanting.push(t as u32);
+            }
+        };
+        let list = fresh.into_iter();
+        // A constant has no say in how often an element is divided.
+        match constants {
+            [None, None] => whole::fit(mesh, list, self.fields, |t, area, [f, g]| {
+                put(t, area, &[(0, f), (1, g)]);
+            })?,
+            _ => {
+                let i = usize::from(constants[0].is_some());
+                whole::fit(mesh, list, [self.fields[i]], |t, area, [f]| {
+                    put(t, area, &[(i, f)]);
+                })?;
+            }
+        }
+        if wanting.is_empty() {
+            return Ok(());
+        }
+        self.sums = [vec![[0.0; 4]; count], vec![[0.0; 4]; count]];
+        divide(mesh, &allowed, self, &wanting)?;
+        for (elements, sums) in self.elements.iter_mut().zip(&self.sums) {
+            if elements.is_empty() {
+                continue;
+            }
+            for &t in &wanting {
+                let area = mesh.area(TriangleId(t));
+                let [first, second, one, two] = sums[t as usize];
+                let element = &mut elements[t as usize];
+                *element = ElementLoad {
+                    corners: [first, second],
+                    mean: element.mean + one / area,
+                    deviation_squared: (two - one * one / area).max(0.0),
+                };
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(self, mesh: &Mesh, constants: [Option<f64>; 2]) -> [Loads; 2] {
+        let reference = self.reference;
+        let mut elements = self.elements.into_iter();
+        constants.map(|constant| {
+            let elements = elements.next().unwrap_or_default();
+            let loads = match constant {
+                Some(value) => {
+                    let [loads] = Loads::constant(mesh, [value]);
+                    loads
+                }
+                None => Loads::new(mesh, elements),
+            };
+            loads.relative_to(reference)
+        })
+    }
 }
 
 impl Integrand for LoadPair<'_> {
@@ -184,101 +273,25 @@ impl Integrand for LoadPair<'_> {
     }
 
     fn clear(&mut self, triangle: usize) {
-        for moments in &mut self.moments {
-            moments.sums[triangle] = [0.0; 5];
-            moments.base[triangle] = f64::NAN;
+        for sums in &mut self.sums {
+            sums[triangle] = [0.0; 4];
         }
     }
 
     fn add(&mut self, piece: &Piece<'_>) {
-        for (i, moments) in self.moments.iter_mut().enumerate() {
-            let f = piece.values(i);
-            let base = &mut moments.base[piece.triangle];
-            if base.is_nan() {
-                *base = f[0];
-            }
-            let sums = &mut moments.sums[piece.triangle];
-            for ((p, at), v) in piece.rule.iter().zip(piece.at).zip(f) {
+        for (i, sums) in self.sums.iter_mut().enumerate() {
+            let Some(base) = self.elements[i].get(piece.triangle).map(|e| e.mean) else {
+                continue;
+            };
+            let sums = &mut sums[piece.triangle];
+            for ((p, at), v) in piece.rule.iter().zip(piece.at).zip(piece.values(i)) {
                 let w = p.weight * piece.area;
-                let d = v - *base;
+                let d = v - base;
                 sums[0] += w * at[0] * v;
                 sums[1] += w * at[1] * v;
-                sums[2] += w * at[2] * v;
-                sums[3] += w * d;
-                sums[4] += w * d * d;
+                sums[2] += w * d;
+                sums[3] += w * d * d;
             }
-        }
-    }
-}
-
-/// The mean of a field over every triangle, to ten digits where it is smooth.
-///
-/// # Errors
-/// A value of the field that is not finite.
-pub fn means(mesh: &Mesh, field: &dyn Field) -> Result<Vec<f64>, FieldError> {
-    if let Some(value) = field.constant() {
-        return Ok(vec![value; mesh.triangle_count()]);
-    }
-    let count = mesh.triangle_count();
-    let mut sums = FieldMeans {
-        field,
-        shares: vec![0.0; count],
-        base: vec![f64::NAN; count],
-        area: areas(mesh),
-    };
-    integrate(mesh, MEAN_CONTROL, &mut sums)?;
-    Ok(sums
-        .base
-        .iter()
-        .zip(&sums.shares)
-        .map(|(b, s)| b + s)
-        .collect())
-}
-
-fn areas(mesh: &Mesh) -> Vec<f64> {
-    mesh.triangle_ids().map(|t| mesh.shape(t).area).collect()
-}
-
-struct FieldMeans<'a> {
-    field: &'a dyn Field,
-    shares: Vec<f64>,
-    base: Vec<f64>,
-    area: Vec<f64>,
-}
-
-impl Integrand for FieldMeans<'_> {
-    fn components(&self) -> usize {
-        1
-    }
-
-    fn sample(&mut self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
-        self.field.sample(at, out)
-    }
-
-    fn judge(&self, piece: &Piece<'_>) -> Judgement {
-        let f = piece.values(0);
-        let (largest, error) = size_and_error(piece.rule, f);
-        let share = piece.area / self.area[piece.triangle];
-        Judgement {
-            magnitude: largest * share,
-            error: share * error,
-        }
-    }
-
-    fn clear(&mut self, triangle: usize) {
-        self.shares[triangle] = 0.0;
-        self.base[triangle] = f64::NAN;
-    }
-
-    fn add(&mut self, piece: &Piece<'_>) {
-        let f = piece.values(0);
-        let base = &mut self.base[piece.triangle];
-        if base.is_nan() {
-            *base = f[0];
-        }
-        let share = piece.area / self.area[piece.triangle];
-        for (p, v) in piece.rule.iter().zip(f) {
-            self.shares[piece.triangle] += p.weight * share * (v - *base);
         }
     }
 }

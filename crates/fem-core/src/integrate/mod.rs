@@ -4,16 +4,31 @@
 //! a smooth function, the element is quartered again and again, but only the quarters that still disagree: a jump along a curve costs points in
 //! proportion to its length, a singular corner a logarithm. The tolerance is relative to the whole integral,
 //! so that coarse meshes are integrated by many points and fine ones by seven.
+//!
+//! Loads and tensions of a refined mesh are taken over where elements stayed what they were ([`load_pair_carried`], [`means_carried`]). That needs
+//! a tolerance that does not depend on the mesh: the [`Reference`] of a problem is found once, on its initial mesh.
+
+use std::collections::VecDeque;
 
 use crate::field::{FieldError, Samples};
-use crate::mesh::{Mesh, Shape};
+use crate::index::TriangleId;
+use crate::mesh::{Mesh, signed_area};
 use crate::quadrature::{POINTS, RulePoint, rule};
 
+mod carry;
+mod data;
 mod loads;
+mod means;
+mod reference;
+mod whole;
 
+pub use data::{ElementLoad, Loads};
 pub use loads::{
-    LOAD_CONTROL, Loads, judge_load, load_pair, loads, means, smooth_error, squared_error,
+    LOAD_CONTROL, judge_load, load_pair, load_pair_carried, load_pair_relative_to, loads,
+    smooth_error, squared_error,
 };
+pub use means::{means, means_carried};
+pub use reference::Reference;
 
 /// Something to be integrated over every element by [`integrate`].
 pub trait Integrand {
@@ -40,6 +55,11 @@ pub trait Integrand {
     /// The parts that every element is sampled in to begin with.
     fn partition(&self) -> Partition {
         Partition::Whole
+    }
+
+    /// What tolerances are relative to, where that is not the mesh integrated over and the magnitudes of the samples on it.
+    fn reference(&self) -> Option<Reference> {
+        None
     }
 
     /// Whether nothing is to be sampled in an element.
@@ -78,6 +98,8 @@ pub struct Piece<'a> {
     pub part: usize,
     /// Area of the piece.
     pub area: f64,
+    /// Its share of the element's area.
+    pub share: f64,
     /// The rule.
     pub rule: &'a [RulePoint; POINTS],
     /// Barycentric coordinates of the points in the element.
@@ -123,7 +145,7 @@ struct Part {
     triangle: u32,
     depth: u32,
     part: u32,
-    /// Share of the element's area before any quartering.
+    /// Share of the element's area.
     share: f64,
     corners: [[f64; 3]; 3],
 }
@@ -185,7 +207,11 @@ pub fn integrate(
     integrand: &mut dyn Integrand,
 ) -> Result<(), FieldError> {
     let rule = rule();
-    let total_area = crate::norms::area(mesh);
+    let reference = integrand.reference();
+    let total_area = match reference {
+        Some(reference) => reference.area,
+        None => crate::norms::area(mesh),
+    };
     let mut sampler = Sampler::new(integrand.components());
     let count = mesh.triangle_count();
     let partition = integrand.partition();
@@ -224,62 +250,125 @@ pub fn integrate(
             },
         )?;
     }
-    // Below a few spacings of the coordinates' double precision the samples are noise, and quartering it would not end.
+    if let Some(reference) = reference {
+        magnitude = reference.magnitude;
+    }
+    let whole = if control.local {
+        Whole::Each(&magnitudes)
+    } else {
+        Whole::Same(magnitude)
+    };
+    let allowed = Allowed {
+        control,
+        coarse: control.largest_share * total_area,
+        whole,
+    };
+    let wanting: Vec<u32> = (0..count)
+        .filter(|&t| control.depth > 0 && allowed.too_large(t, errors[t]))
+        .map(|t| t as u32)
+        .collect();
+    wanting.iter().for_each(|&t| integrand.clear(t as usize));
+    divide(mesh, &allowed, integrand, &wanting)
+}
+
+/// What errors are compared with.
+enum Whole<'a> {
+    /// One magnitude for either integral.
+    Same([f64; 2]),
+    /// That of the element.
+    Each(&'a [[f64; 2]]),
+}
+
+/// The errors and sizes that pieces may have.
+struct Allowed<'a> {
+    control: Control,
+    /// The largest area of a piece.
+    coarse: f64,
+    whole: Whole<'a>,
+}
+
+impl Allowed<'_> {
+    #[inline]
+    fn too_large(&self, t: usize, errors: [f64; 2]) -> bool {
+        let whole = match self.whole {
+            Whole::Same(magnitude) => magnitude,
+            Whole::Each(magnitudes) => magnitudes[t],
+        };
+        (0..2).any(|k| errors[k] > self.control.tolerance * whole[k])
+    }
+}
+
+/// Divides elements that seven points do not do for, and integrates over the parts; nothing is added for these elements before.
+fn divide(
+    mesh: &Mesh,
+    allowed: &Allowed<'_>,
+    integrand: &mut dyn Integrand,
+    wanting: &[u32],
+) -> Result<(), FieldError> {
+    if wanting.is_empty() {
+        return Ok(());
+    }
+    let rule = rule();
+    let control = allowed.control;
+    let mut sampler = Sampler::new(integrand.components());
+    let partition = integrand.partition();
+    let mut parts: Vec<Part> = Vec::with_capacity(BLOCK);
+    // First in, first out: the pieces of an element are added in an order that does not depend on the elements around it.
+    let mut queue: VecDeque<Part> = VecDeque::new();
+    let mut begin: Vec<Part> = Vec::new();
+    let mut wanting = wanting.iter();
+    loop {
+        // Another element is begun only when the block is not full, so that the queue stays small.
+        while queue.len() < BLOCK
+            && let Some(&t) = wanting.next()
+        {
+            begin.clear();
+            if partition == Partition::WholeThenDual {
+                Partition::Dual.parts(t, &mut begin);
+                queue.extend(begin.drain(..));
+            } else {
+                partition.parts(t, &mut begin);
+                begin.iter().for_each(|part| quarter(part, &mut queue));
+            }
+        }
+        if queue.is_empty() {
+            return Ok(());
+        }
+        parts.clear();
+        parts.extend(queue.drain(..BLOCK.min(queue.len())));
+        sampler.run(
+            mesh,
+            &rule,
+            &parts,
+            integrand,
+            &mut |integrand, piece, part| {
+                let errors = [integrand.judge(piece), integrand.judge_second(piece)]
+                    .map(|judgement| judgement.error);
+                let divisible = part.depth < control.depth
+                    && piece.area > smallest(mesh, TriangleId(part.triangle));
+                let coarse = piece.area > allowed.coarse;
+                if (coarse || allowed.too_large(piece.triangle, errors)) && divisible {
+                    quarter(part, &mut queue);
+                } else {
+                    integrand.add(piece);
+                }
+            },
+        )?;
+    }
+}
+
+/// The area below which a piece of an element is not divided: a few spacings of its coordinates' double precision wide, its samples are
+/// noise, and quartering it would not end.
+fn smallest(mesh: &Mesh, t: TriangleId) -> f64 {
     let extent = mesh
-        .points()
+        .corners(t)
         .iter()
         .flatten()
         .fold(0.0f64, |m, x| m.max(x.abs()));
-    let smallest = (SPACINGS * f64::EPSILON * extent).powi(2);
-    let too_large = |t: usize, errors: [f64; 2]| {
-        let whole = if control.local {
-            magnitudes[t]
-        } else {
-            magnitude
-        };
-        (0..2).any(|k| errors[k] > control.tolerance * whole[k])
-    };
-    let mut stack: Vec<Part> = Vec::new();
-    let mut begin: Vec<Part> = Vec::new();
-    for t in 0..count {
-        if control.depth > 0 && too_large(t, errors[t]) {
-            integrand.clear(t);
-            begin.clear();
-            if partition == Partition::WholeThenDual {
-                Partition::Dual.parts(t as u32, &mut stack);
-            } else {
-                partition.parts(t as u32, &mut begin);
-                begin.iter().for_each(|part| quarter(part, &mut stack));
-            }
-        }
-        // Work the stack off whenever a block is full, so that it stays small.
-        while stack.len() >= BLOCK || (t + 1 == count && !stack.is_empty()) {
-            let keep = stack.len().saturating_sub(BLOCK);
-            parts.clear();
-            parts.extend(stack.drain(keep..));
-            sampler.run(
-                mesh,
-                &rule,
-                &parts,
-                integrand,
-                &mut |integrand, piece, part| {
-                    let errors = [integrand.judge(piece), integrand.judge_second(piece)]
-                        .map(|judgement| judgement.error);
-                    let coarse = piece.area > control.largest_share * total_area;
-                    let divisible = part.depth < control.depth && piece.area > smallest;
-                    if divisible && (coarse || too_large(piece.triangle, errors)) {
-                        quarter(part, &mut stack);
-                    } else {
-                        integrand.add(piece);
-                    }
-                },
-            )?;
-        }
-    }
-    Ok(())
+    (SPACINGS * f64::EPSILON * extent).powi(2)
 }
 
-fn quarter(part: &Part, stack: &mut Vec<Part>) {
+fn quarter(part: &Part, queue: &mut VecDeque<Part>) {
     let [a, b, c] = part.corners;
     let middle = |p: [f64; 3], q: [f64; 3]| {
         [
@@ -290,8 +379,9 @@ fn quarter(part: &Part, stack: &mut Vec<Part>) {
     };
     let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
     for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
-        stack.push(Part {
+        queue.push_back(Part {
             depth: part.depth + 1,
+            share: 0.25 * part.share,
             corners,
             ..*part
         });
@@ -333,9 +423,8 @@ impl Sampler {
         let n = parts.len() * POINTS;
         for (k, part) in parts.iter().enumerate() {
             let t = part.triangle as usize;
-            let corners = mesh.corners(crate::TriangleId(part.triangle));
-            // Quarters of quarters: the area follows from the depth.
-            self.area[k] = Shape::new(corners).area * part.share * 0.25f64.powi(part.depth as i32);
+            let corners = mesh.corners(TriangleId(part.triangle));
+            self.area[k] = signed_area(corners) * part.share;
             for (q, point) in rule.iter().enumerate() {
                 let mut at = [0.0; 3];
                 for i in 0..3 {
@@ -362,6 +451,7 @@ impl Sampler {
                 triangle: part.triangle as usize,
                 part: part.part as usize,
                 area: self.area[k],
+                share: part.share,
                 rule,
                 at: &self.at[k],
                 values: &self.values[..n * self.components],
