@@ -248,7 +248,9 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                     let later = losses.iter().skip(1).sum::<f64>();
                     let rest = report.error_squared;
                     let known = match losses.len() {
-                        1 => left.is_some(),
+                        0 => false,
+                        // One step, or two that tell their own ratio.
+                        _ if left.is_some() => true,
                         n => n >= LOOK && (rest <= SEEN * later || rest <= SEEN * SEEN * target),
                     };
                     // On a small mesh a few vertices of the contact set hold much of the energy: it must stand first.
