@@ -2,15 +2,17 @@
 //!
 //! A triangle (v0, v1, v2) is bisected at the midpoint p of its refinement edge (v0, v1) into (v2, v0, p) and (v1, v2, p), whose newest
 //! vertex is p; both stay counter-clockwise. A pass marks edges instead of recursing: if any edge of a triangle is split, its
-//! refinement edge is too. Every triangle then has one to four children, known from three bits, and takes the
+//! refinement edge is too. Every triangle then has one to four children, known from three bits ([`crate::parts`]), and takes the
 //! place of its parent in the order, so that the leaves always lie along a space-filling curve: it enters an
 //! even triangle at v0 and leaves at v1, an odd one the other way round.
 //!
-//! The cost of a pass is linear in the number of triangles, the closure linear in what it splits.
+//! The cost of a pass is linear in the number of triangles, the closure linear in what it splits. Three loops do it: one counts, one makes the
+//! vertices, one the triangles; each writes its arrays from front to back.
 
 use crate::error::MeshError;
 use crate::index::{TriangleId, VertexId};
 use crate::mesh::{Mesh, TRIANGLE_LIMIT, signed_area};
+use crate::parts::{FACES, Link, PARTS, REFINEMENT_EDGE};
 use crate::topology::{Birth, Neighbour, Topology};
 
 /// How far a marked triangle is divided.
@@ -30,60 +32,48 @@ pub struct Refinement {
     pub old_vertices: usize,
     /// The parent of every triangle of the refined mesh, a number in the old one.
     pub parent: Vec<TriangleId>,
+    /// Which edges of every triangle of the old mesh were split: bit `i` stands for face `i`. 0 where the triangle stayed as it was.
+    pub split: Vec<u8>,
     /// Edges looked at by the closure: a measure of its work.
     pub closure_steps: usize,
 }
 
-/// Split bits of a triangle: bit `i` stands for the edge opposite to local vertex `i`; bit 2 is the refinement edge.
-const REFINEMENT_EDGE: usize = 2;
-
 impl Mesh {
-    /// Refines the marked triangles, and as many others as conformity needs.
-    ///
-    /// The mesh is left as it was when an error is returned.
+    /// This mesh with the marked triangles refined, and as many others as conformity needs.
     ///
     /// # Errors
     /// [`MeshError::CoordinatesExhausted`] when an edge is so short that its midpoint is not distinct from its ends in double
     /// precision or a child would have no area; [`MeshError::TooLarge`] beyond 2^30 - 1 triangles.
+    pub fn refined(
+        &self,
+        marked: &[TriangleId],
+        children: Children,
+    ) -> Result<(Mesh, Refinement), MeshError> {
+        let (split, closure_steps) = self.closure(marked, children);
+        let plan = Plan::new(&self.topology, &split)?;
+        let vertices = plan.vertices(self)?;
+        let (mesh, parent) = plan.triangles(self, vertices)?;
+        let refinement = Refinement {
+            old_vertices: self.vertex_count(),
+            parent,
+            split,
+            closure_steps,
+        };
+        Ok((mesh, refinement))
+    }
+
+    /// Refines the marked triangles in place, as [`Mesh::refined`].
+    ///
+    /// # Errors
+    /// As there; the mesh is then left as it was.
     pub fn refine(
         &mut self,
         marked: &[TriangleId],
         children: Children,
     ) -> Result<Refinement, MeshError> {
-        let (split, closure_steps) = self.closure(marked, children);
-        let plan = Plan::new(&self.topology, split)?;
-        let points = plan.points(self)?;
-        let (triangles, parent) = plan.triangles(self);
-        let mut all_points = std::mem::take(&mut self.points);
-        let old_vertices = all_points.len();
-        all_points.extend_from_slice(&points);
-        for (v, &parent) in triangles.iter().zip(&parent) {
-            let area = signed_area(v.map(|i| all_points[i.index()]));
-            if plan.split[parent.index()] != 0 && area.is_nan() | (area <= 0.0) {
-                let error = exhausted(all_points[v[0].index()], all_points[v[1].index()]);
-                all_points.truncate(old_vertices);
-                self.points = all_points;
-                return Err(error);
-            }
-        }
-        let genealogy = plan.genealogy(&self.topology);
-        let boundary = plan.boundary(&self.topology);
-        let neighbours = plan.neighbours(&self.topology);
-        let generation = plan.generation(&self.topology);
-        self.region = parent.iter().map(|p| self.region[p.index()]).collect();
-        self.points = all_points;
-        self.topology = Topology {
-            triangles,
-            neighbours,
-            generation,
-            boundary,
-            genealogy,
-        };
-        Ok(Refinement {
-            old_vertices,
-            parent,
-            closure_steps,
-        })
+        let (mesh, refinement) = self.refined(marked, children)?;
+        *self = mesh;
+        Ok(refinement)
     }
 
     /// Refines every triangle once.
@@ -101,8 +91,8 @@ impl Mesh {
         let mut stack: Vec<(TriangleId, usize)> = Vec::new();
         let mut steps = 0;
         let faces: &[usize] = match children {
-            Children::Two => &[REFINEMENT_EDGE],
-            Children::Four => &[REFINEMENT_EDGE, 1, 0],
+            Children::Two => &FACES[..1],
+            Children::Four => &FACES,
         };
         for &t in marked {
             for &face in faces {
@@ -136,297 +126,303 @@ fn exhausted(p: [f64; 2], q: [f64; 2]) -> MeshError {
     }
 }
 
-/// Numbers of everything that a pass makes, known before anything is written.
+/// What is known of an old triangle before anything is written.
+#[derive(Clone, Copy)]
+struct Entry {
+    /// Its first child.
+    child: u32,
+    /// The first vertex born on an edge that it owns: of two triangles, the lower number numbers what is born between them.
+    vertex: u32,
+    /// The key into [`PARTS`]: split edges, and the parity of the generation in bit 3.
+    key: u8,
+    /// The split edges that it owns.
+    owned: u8,
+}
+
+impl Entry {
+    fn is_split(self, face: usize) -> bool {
+        self.key & 1 << face != 0
+    }
+
+    fn owns(self, face: usize) -> bool {
+        self.owned & 1 << face != 0
+    }
+
+    /// The vertex born on an owned edge; [`FACES`] gives the order.
+    fn born(self, face: usize) -> VertexId {
+        VertexId(self.vertex + (self.owned as u32 >> (face + 1)).count_ones())
+    }
+}
+
+/// Numbers of everything that a pass makes.
 struct Plan<'a> {
-    topology: &'a [[VertexId; 3]],
-    around: &'a [[Neighbour; 3]],
-    odd: Vec<bool>,
-    split: Vec<u8>,
-    /// First child of every triangle; one more entry with the total.
-    child: Vec<u32>,
-    /// First vertex born on an edge that a triangle owns; one more entry with the total.
-    vertex: Vec<u32>,
+    old: &'a Topology,
+    entries: Vec<Entry>,
+    vertices: usize,
+    triangles: usize,
+}
+
+/// Everything of a refined mesh that has one entry a vertex.
+struct Vertices {
+    points: Vec<[f64; 2]>,
+    boundary: Vec<bool>,
+    genealogy: Vec<Birth>,
 }
 
 impl<'a> Plan<'a> {
-    fn new(topology: &'a Topology, split: Vec<u8>) -> Result<Self, MeshError> {
-        let count = topology.triangle_count();
-        let grown = count + split.iter().map(|b| b.count_ones() as usize).sum::<usize>();
-        if grown > TRIANGLE_LIMIT {
+    fn new(old: &'a Topology, split: &[u8]) -> Result<Self, MeshError> {
+        let count = old.triangle_count();
+        let triangles = count + split.iter().map(|b| b.count_ones() as usize).sum::<usize>();
+        if triangles > TRIANGLE_LIMIT {
             return Err(MeshError::TooLarge {
-                triangles: grown,
+                triangles,
                 limit: TRIANGLE_LIMIT,
             });
         }
-        let mut plan = Plan {
-            topology: &topology.triangles,
-            around: &topology.neighbours,
-            odd: topology.generation.iter().map(|g| g & 1 == 1).collect(),
-            split,
-            child: vec![0; count + 1],
-            vertex: vec![0; count + 1],
-        };
-        plan.vertex[0] = topology.vertex_count() as u32;
-        for t in 0..count {
-            plan.child[t + 1] = plan.child[t] + 1 + plan.split[t].count_ones();
-            plan.vertex[t + 1] =
-                plan.vertex[t] + (0..3).filter(|&f| plan.owns(t, f)).count() as u32;
+        let mut entries = Vec::with_capacity(count);
+        let (mut child, mut vertex) = (0, old.vertex_count() as u32);
+        for (t, ((&split, around), generation)) in split
+            .iter()
+            .zip(&old.neighbours)
+            .zip(&old.generation)
+            .enumerate()
+        {
+            let mut later = 0;
+            for face in 0..3 {
+                later |= (around[face].is_behind(TriangleId(t as u32)) as u8) << face;
+            }
+            let owned = split & later;
+            entries.push(Entry {
+                child,
+                vertex,
+                key: split | ((generation & 1) as u8) << 3,
+                owned,
+            });
+            child += 1 + split.count_ones();
+            vertex += owned.count_ones();
         }
-        Ok(plan)
-    }
-
-    fn is_split(&self, t: usize, face: usize) -> bool {
-        self.split[t] & 1 << face != 0
-    }
-
-    /// Whether the vertex born on this edge is numbered by triangle `t`.
-    fn owns(&self, t: usize, face: usize) -> bool {
-        self.is_split(t, face)
-            && self.around[t][face]
-                .get()
-                .is_none_or(|(n, _)| n.index() > t)
-    }
-
-    /// The vertex born on a split edge.
-    fn midpoint(&self, t: usize, face: usize) -> VertexId {
-        let (t, face) = match self.around[t][face].get() {
-            Some((n, g)) if n.index() < t => (n.index(), g),
-            _ => (t, face),
-        };
-        let before = (face + 1..3).filter(|&f| self.owns(t, f)).count() as u32;
-        VertexId(self.vertex[t] + before)
-    }
-
-    /// The split edges that are numbered here, as (triangle, face), in the order of their vertices.
-    fn owned(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        (0..self.topology.len()).flat_map(move |t| {
-            (0..3)
-                .rev()
-                .filter(move |&f| self.owns(t, f))
-                .map(move |f| (t, f))
+        Ok(Plan {
+            old,
+            entries,
+            vertices: vertex as usize,
+            triangles,
         })
     }
 
-    /// Number of the part of triangle `t` that holds the named end of the named half.
-    ///
-    /// The half with v0 is cut further if face 1 is split, the one with v1 if face 0 is. `at` is the local vertex
-    /// that the wanted child contains (any of the half when the half is not cut further).
-    fn part(&self, t: usize, left: bool, at: usize) -> u32 {
-        let (left_cut, right_cut) = (self.is_split(t, 1) as u32, self.is_split(t, 0) as u32);
-        let offset = match (self.odd[t], left) {
-            // Even triangles run v0 -> v2 -> v1, odd ones v1 -> v2 -> v0.
-            (false, true) => left_cut * (at == 2) as u32,
-            (false, false) => 1 + left_cut + right_cut * (at == 1) as u32,
-            (true, false) => right_cut * (at == 2) as u32,
-            (true, true) => 1 + right_cut + left_cut * (at == 0) as u32,
-        };
-        self.child[t] + offset
-    }
-
-    /// The child of `t` that touches face `face` near local vertex `at`, and the local number of that edge there.
-    fn outer(&self, t: usize, face: usize, at: usize) -> Neighbour {
-        let (child, face) = if self.split[t] == 0 {
-            (self.child[t], face)
-        } else {
-            let left = match face {
-                1 => true,
-                0 => false,
-                _ => at == 0,
-            };
-            let cut = self.is_split(t, if left { 1 } else { 0 });
-            let local = match (face, left, cut) {
-                (2, true, false) => 0,
-                (2, false, false) => 1,
-                (2, _, true) => 2,
-                (_, _, false) => 2,
-                (1, _, true) => (at == 0) as usize,
-                (_, _, true) => (at == 2) as usize,
-            };
-            (self.part(t, left, at), local)
-        };
-        Neighbour::new(TriangleId(child), face)
-    }
-
-    fn points(&self, mesh: &Mesh) -> Result<Vec<[f64; 2]>, MeshError> {
-        let mut points =
-            Vec::with_capacity((self.vertex[self.topology.len()] - self.vertex[0]) as usize);
-        for (t, face) in self.owned() {
-            let [a, b] = mesh.topology.face(TriangleId(t as u32), face);
-            let (p, q) = (mesh.points[a.index()], mesh.points[b.index()]);
-            let straight = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
-            let m = match mesh.curve {
-                Some(circle) if self.around[t][face] == Neighbour::BOUNDARY => {
-                    circle.project(straight)
-                }
-                _ => straight,
-            };
-            if m == p || m == q {
-                return Err(exhausted(p, q));
-            }
-            points.push(m);
+    /// The vertex born on a split edge.
+    #[inline(always)]
+    fn midpoint(&self, t: usize, face: usize) -> VertexId {
+        let entry = self.entries[t];
+        if entry.owns(face) {
+            return entry.born(face);
         }
-        Ok(points)
-    }
-
-    fn triangles(&self, mesh: &Mesh) -> (Vec<[VertexId; 3]>, Vec<TriangleId>) {
-        let total = self.child[self.topology.len()] as usize;
-        let mut triangles = vec![[VertexId::NONE; 3]; total];
-        let mut parent = vec![TriangleId(0); total];
-        for (t, &v) in mesh.topology.triangles.iter().enumerate() {
-            let first = self.child[t] as usize;
-            parent[first..self.child[t + 1] as usize].fill(TriangleId(t as u32));
-            if self.split[t] == 0 {
-                triangles[first] = v;
-                continue;
-            }
-            let [v0, v1, v2] = v;
-            let p = self.midpoint(t, REFINEMENT_EDGE);
-            let mut put = |left: bool, at: usize, v: [VertexId; 3]| {
-                triangles[self.part(t, left, at) as usize] = v
-            };
-            if self.is_split(t, 1) {
-                let q = self.midpoint(t, 1);
-                put(true, 0, [v0, p, q]);
-                put(true, 2, [p, v2, q]);
-            } else {
-                put(true, 0, [v2, v0, p]);
-            }
-            if self.is_split(t, 0) {
-                let q = self.midpoint(t, 0);
-                put(false, 1, [p, v1, q]);
-                put(false, 2, [v2, p, q]);
-            } else {
-                put(false, 1, [v1, v2, p]);
-            }
+        match self.old.neighbours[t][face].get() {
+            Some((n, g)) => self.entries[n.index()].born(g),
+            None => VertexId::NONE,
         }
-        (triangles, parent)
-    }
-
-    fn neighbours(&self, topology: &Topology) -> Vec<[Neighbour; 3]> {
-        let mut result = vec![[Neighbour::BOUNDARY; 3]; self.child[self.topology.len()] as usize];
-        let mut link = |here: Neighbour, there: Neighbour| {
-            if let Some((t, face)) = here.get() {
-                result[t.index()][face] = there;
-            }
-        };
-        for t in 0..topology.triangle_count() {
-            for face in 0..3 {
-                let Some((n, g)) = topology.neighbours[t][face].get() else {
-                    continue;
-                };
-                let n = n.index();
-                if self.is_split(t, face) {
-                    // The ends in the neighbour's numbering: the edge runs the other way round there.
-                    link(
-                        self.outer(t, face, (face + 1) % 3),
-                        self.outer(n, g, (g + 2) % 3),
-                    );
-                    link(
-                        self.outer(t, face, (face + 2) % 3),
-                        self.outer(n, g, (g + 1) % 3),
-                    );
-                } else {
-                    link(
-                        self.outer(t, face, (face + 1) % 3),
-                        self.outer(n, g, (g + 1) % 3),
-                    );
-                }
-            }
-            if self.split[t] == 0 {
-                continue;
-            }
-            let at = |left: bool, at: usize, face: usize| {
-                Neighbour::new(TriangleId(self.part(t, left, at)), face)
-            };
-            let left = if self.is_split(t, 1) {
-                let (near, far) = (at(true, 0, 0), at(true, 2, 1));
-                link(near, far);
-                link(far, near);
-                at(true, 2, 2)
-            } else {
-                at(true, 0, 1)
-            };
-            let right = if self.is_split(t, 0) {
-                let (near, far) = (at(false, 1, 1), at(false, 2, 0));
-                link(near, far);
-                link(far, near);
-                at(false, 2, 2)
-            } else {
-                at(false, 1, 0)
-            };
-            link(left, right);
-            link(right, left);
-        }
-        result
-    }
-
-    fn generation(&self, topology: &Topology) -> Vec<u16> {
-        let mut generation = vec![0; self.child[self.topology.len()] as usize];
-        for (t, &old) in topology.generation.iter().enumerate() {
-            if self.split[t] == 0 {
-                generation[self.child[t] as usize] = old;
-                continue;
-            }
-            for (left, cut, ends) in [(true, 1, [0, 2]), (false, 0, [1, 2])] {
-                let deeper = old + 1 + self.is_split(t, cut) as u16;
-                for at in ends {
-                    generation[self.part(t, left, at) as usize] = deeper;
-                }
-            }
-        }
-        generation
-    }
-
-    fn boundary(&self, topology: &Topology) -> Vec<bool> {
-        let mut boundary = topology.boundary.clone();
-        boundary.extend(
-            self.owned()
-                .map(|(t, face)| self.around[t][face] == Neighbour::BOUNDARY),
-        );
-        boundary
     }
 
     /// The vertex opposite to a split edge at the moment when it is bisected.
+    #[inline(always)]
     fn opposite(&self, t: usize, face: usize) -> VertexId {
         if face == REFINEMENT_EDGE {
-            self.topology[t][2]
+            self.old.triangles[t][2]
         } else {
             self.midpoint(t, REFINEMENT_EDGE)
         }
     }
 
-    fn genealogy(&self, topology: &Topology) -> Vec<Birth> {
-        let mut genealogy = topology.genealogy.clone();
-        let old = genealogy.len();
-        for (t, face) in self.owned() {
-            let across = self.around[t][face].get();
-            genealogy.push(Birth {
-                parents: topology.face(TriangleId(t as u32), face),
-                opposite: [
+    /// What lies behind a face of the old mesh, near each of its ends, and the vertex born on it, should the triangle there own it.
+    #[inline(always)]
+    fn behind(&self, next: Neighbour) -> ([Neighbour; 2], VertexId) {
+        let Some((n, face)) = next.get() else {
+            return ([Neighbour::BOUNDARY; 2], VertexId::NONE);
+        };
+        let entry = self.entries[n.index()];
+        // The edge runs the other way round there.
+        let [end, start] = PARTS[(entry.key & 15) as usize].touching[face];
+        let at = |place| Neighbour::at(TriangleId(entry.child), place as u32);
+        ([at(start), at(end)], entry.born(face))
+    }
+
+    /// Makes the vertices.
+    fn vertices(&self, mesh: &Mesh) -> Result<Vertices, MeshError> {
+        let old = self.old.vertex_count();
+        let mut points = grown(&mesh.points, self.vertices);
+        let mut boundary = grown(&self.old.boundary, self.vertices);
+        let mut genealogy = grown(&self.old.genealogy, self.vertices);
+        for (t, entry) in self.entries.iter().enumerate() {
+            if entry.owned == 0 {
+                continue;
+            }
+            for face in FACES {
+                if !entry.owns(face) {
+                    continue;
+                }
+                let parents = self.old.face(TriangleId(t as u32), face);
+                let [p, q] = parents.map(|v| points[v.index()]);
+                let straight = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
+                let across = self.old.neighbours[t][face].get();
+                let m = match mesh.curve {
+                    Some(circle) if across.is_none() => circle.project(straight),
+                    _ => straight,
+                };
+                if m == p || m == q {
+                    return Err(exhausted(p, q));
+                }
+                let opposite = [
                     self.opposite(t, face),
                     across.map_or(VertexId::NONE, |(n, g)| self.opposite(n.index(), g)),
-                ],
-                level: 0,
-            });
+                ];
+                let mut birth = Birth {
+                    parents,
+                    opposite,
+                    level: 0,
+                };
+                // Where the edge is the refinement edge on both sides, nothing around it is new.
+                if face == REFINEMENT_EDGE && across.is_none_or(|(_, g)| g == REFINEMENT_EDGE) {
+                    birth.level = level(&genealogy, &birth);
+                }
+                points.push(m);
+                boundary.push(across.is_none());
+                genealogy.push(birth);
+            }
         }
         set_levels(&mut genealogy, old);
-        genealogy
+        Ok(Vertices {
+            points,
+            boundary,
+            genealogy,
+        })
+    }
+
+    /// Makes the triangles, and with them the refined mesh; the parent of each.
+    fn triangles(
+        &self,
+        mesh: &Mesh,
+        vertices: Vertices,
+    ) -> Result<(Mesh, Vec<TriangleId>), MeshError> {
+        let points = &vertices.points;
+        let mut triangles = Vec::with_capacity(self.triangles);
+        let mut neighbours = Vec::with_capacity(self.triangles);
+        let mut generation = Vec::with_capacity(self.triangles);
+        let mut region = Vec::with_capacity(self.triangles);
+        let mut parent = Vec::with_capacity(self.triangles);
+        for (t, &entry) in self.entries.iter().enumerate() {
+            let corners = self.old.triangles[t];
+            let around = self.old.neighbours[t];
+            let old_generation = self.old.generation[t];
+            let mut vertex = [corners[0]; 8];
+            vertex[..3].copy_from_slice(&corners);
+            let mut outer = [Neighbour::BOUNDARY; 8];
+            for face in 0..3 {
+                let (ends, theirs) = self.behind(around[face]);
+                outer[2 * face] = ends[0];
+                outer[2 * face + 1] = ends[1];
+                if entry.is_split(face) {
+                    let mine = entry.owns(face);
+                    vertex[3 + face] = if mine { entry.born(face) } else { theirs };
+                }
+            }
+            if entry.key & 7 == 0 {
+                triangles.push(corners);
+                neighbours.push([outer[0], outer[2], outer[4]]);
+                generation.push(old_generation);
+                region.push(mesh.region[t]);
+                parent.push(TriangleId(t as u32));
+                continue;
+            }
+            let parts = &PARTS[(entry.key & 15) as usize];
+            for part in 0..parts.count as usize & 7 {
+                let [a, b, c] = parts.corners[part & 3];
+                let corners = [
+                    vertex[(a & 7) as usize],
+                    vertex[(b & 7) as usize],
+                    vertex[(c & 7) as usize],
+                ];
+                let [a, b, c] = [
+                    points[corners[0].index()],
+                    points[corners[1].index()],
+                    points[corners[2].index()],
+                ];
+                let area = signed_area([a, b, c]);
+                if area.is_nan() | (area <= 0.0) {
+                    return Err(exhausted(a, b));
+                }
+                let mut around = [Neighbour::BOUNDARY; 3];
+                for face in 0..3 {
+                    around[face] = match parts.link(part & 3, face) {
+                        Link::Inner(place) => Neighbour::at(TriangleId(entry.child), place),
+                        Link::Outer(side) => outer[side],
+                    };
+                }
+                triangles.push(corners);
+                neighbours.push(around);
+                generation.push(old_generation + parts.depth[part & 3] as u16);
+                region.push(mesh.region[t]);
+                parent.push(TriangleId(t as u32));
+            }
+        }
+        let Vertices {
+            points,
+            boundary,
+            genealogy,
+        } = vertices;
+        let topology = Topology {
+            triangles,
+            neighbours,
+            generation,
+            boundary,
+            genealogy,
+        };
+        let refined = Mesh {
+            topology,
+            points,
+            region,
+            curve: mesh.curve,
+        };
+        Ok((refined, parent))
     }
 }
 
-/// Sets the levels of the vertices from `old` on; parents are old, opposite vertices may be new themselves.
+/// A copy with room for `count` entries.
+fn grown<T: Copy>(old: &[T], count: usize) -> Vec<T> {
+    let mut new = Vec::with_capacity(count);
+    new.extend_from_slice(old);
+    new
+}
+
+/// One more than the largest level around a birth.
+#[inline]
+fn level(genealogy: &[Birth], birth: &Birth) -> u16 {
+    let of = |v: VertexId| genealogy[v.index()].level;
+    let [c, d] = birth.opposite;
+    let far = if d.is_some() { of(d) } else { 0 };
+    1 + of(birth.parents[0])
+        .max(of(birth.parents[1]))
+        .max(of(c))
+        .max(far)
+}
+
+/// Sets the levels that are still 0 from vertex `old` on; parents are old, opposite vertices may be new themselves.
 ///
 /// The opposite vertex of an edge that is not a refinement edge is the midpoint of one that comes before it in the bisection, so the
-/// dependence has no cycles and the walk ends.
+/// dependence has no cycles and the walk ends. On most meshes that midpoint has its level already and nothing is walked.
 fn set_levels(genealogy: &mut [Birth], old: usize) {
     let mut stack = Vec::new();
     for p in old..genealogy.len() {
+        let birth = genealogy[p];
+        if birth.level > 0 {
+            continue;
+        }
+        let known =
+            |q: VertexId| !q.is_some() | (q.index() < old) || genealogy[q.index()].level > 0;
+        if known(birth.opposite[0]) && known(birth.opposite[1]) {
+            genealogy[p].level = level(genealogy, &birth);
+            continue;
+        }
         stack.push(p);
         while let Some(&p) = stack.last() {
-            if genealogy[p].level > 0 {
-                stack.pop();
-                continue;
-            }
             let birth = genealogy[p];
             let waiting = birth
                 .opposite
@@ -438,13 +434,7 @@ fn set_levels(genealogy: &mut [Birth], old: usize) {
                     stack.push(q.index());
                 }
                 None => {
-                    let around = birth.parents.iter().chain(&birth.opposite);
-                    let top = around
-                        .filter(|q| q.is_some())
-                        .map(|q| genealogy[q.index()].level)
-                        .max()
-                        .unwrap_or(0);
-                    genealogy[p].level = top + 1;
+                    genealogy[p].level = level(genealogy, &birth);
                     stack.pop();
                 }
             }

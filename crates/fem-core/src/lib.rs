@@ -24,6 +24,7 @@ pub mod integrate;
 pub mod invariants;
 pub mod mesh;
 pub mod norms;
+mod parts;
 pub mod quadrature;
 pub mod scale;
 pub mod sparse;

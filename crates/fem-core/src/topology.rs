@@ -19,6 +19,19 @@ impl Neighbour {
         Neighbour(triangle.0 << 2 | face as u32)
     }
 
+    /// The place `place` (`part << 2 | face`) counted from triangle `first`.
+    #[inline]
+    pub(crate) fn at(first: TriangleId, place: u32) -> Self {
+        debug_assert!(place & 3 < 3 && first.0 + (place >> 2) < (1 << 30) - 1);
+        Neighbour((first.0 << 2) + place)
+    }
+
+    /// Whether this is the boundary or a triangle with a higher number than `triangle`.
+    #[inline]
+    pub(crate) fn is_behind(self, triangle: TriangleId) -> bool {
+        self.0 >> 2 > triangle.0
+    }
+
     /// Triangle and local edge number, or `None` at the boundary.
     #[inline]
     pub fn get(self) -> Option<(TriangleId, usize)> {
