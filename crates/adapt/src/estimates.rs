@@ -3,10 +3,10 @@
 use contact::{DiscreteProblem, Solution};
 use estimate::certificate::POINCARE;
 use estimate::{
-    Certificate, ContactSet, Energy, Given, GlobalBound, Grade, Moments, Paper, TrueErrors,
-    certify, root_sum,
+    Certificate, ContactSet, Energy, Given, GlobalBound, Grade, Moments, Paper, Squares,
+    TrueErrors, certify,
 };
-use fem_core::{FieldError, Mesh, Scale, TriangleId};
+use fem_core::{FieldError, Mesh, Scale};
 
 use crate::level::BALANCE;
 use crate::problem::Problem;
@@ -21,11 +21,11 @@ pub struct Estimates {
     /// The terms of the paper's global bound, if its indicators are wanted.
     pub global_bound: Option<GlobalBound>,
     /// Residual estimator, if wanted.
-    pub residual: Option<Vec<f64>>,
+    pub residual: Option<Squares>,
     /// The certificate, if wanted.
     pub certificate: Option<Certificate>,
-    /// Data oscillation.
-    pub oscillation: Vec<f64>,
+    /// Data oscillation; none for constant loads, which have no oscillation.
+    pub oscillation: Option<Squares>,
     /// Errors against the exact solution, if known.
     pub errors: Option<TrueErrors>,
     /// The contact set against the exact one, if that is known.
@@ -60,12 +60,12 @@ impl Estimates {
     ) -> Result<Estimates, LevelError> {
         let wants = |e| settings.estimate.wants(e);
         let paper = wants(Estimator::Paper).then(|| estimate::paper(mesh, discrete, solution));
-        let residual =
-            wants(Estimator::Residual).then(|| estimate::residual(mesh, discrete, solution));
-        let oscillation = estimate::oscillation(mesh, discrete);
-        let global_bound = paper
-            .as_ref()
-            .map(|paper| estimate::global_bound(mesh, discrete, solution, paper, &oscillation));
+        let sweep = estimate::sweep(mesh, discrete, solution, wants(Estimator::Residual));
+        let oscillation = sweep.oscillation;
+        let global_bound = paper.as_ref().map(|paper| {
+            let oscillation = oscillation.as_ref().map_or(0.0, Squares::total);
+            estimate::global_bound(mesh, discrete, solution, paper, oscillation)
+        });
         let errors = match &problem.exact {
             Some(exact) => Some(estimate::true_errors(
                 mesh,
@@ -92,48 +92,40 @@ impl Estimates {
             )?),
             None => None,
         };
-        let weighted = settings.estimate.estimator != Estimator::Paper;
-        let seen = settings.estimate.estimator == Estimator::Certified;
-        let unseen: Vec<f64> = (0..mesh.triangle_count())
-            .map(|t| {
-                if seen {
-                    return 0.0;
-                }
-                let h = mesh.shape(TriangleId(t as u32)).diameter();
-                let part = |i: usize| {
-                    discrete.loads[i].deviation_squared(t)
-                        / tension_weight(discrete, i, t, weighted)
-                };
-                h * h * (part(0) + part(1))
-            })
-            .collect();
-        // The driving estimator was asked for, so it is there.
-        let driving: &[f64] = match settings.estimate.estimator {
-            Estimator::Paper => paper.as_ref().map_or(&[], |p| &p.eta_k),
-            Estimator::Residual => residual.as_deref().unwrap_or_default(),
-            Estimator::Certified => certificate.as_ref().map_or(&[], |c| &c.local),
+        let residual = sweep.residual;
+        let squares = |local: &[f64]| -> Vec<f64> { local.iter().map(|e| e * e).collect() };
+        // The driving estimator was asked for, so it is there. The certificate sees all of the loads.
+        let (mut marking, unseen) = match settings.estimate.estimator {
+            Estimator::Paper => (
+                paper.as_ref().map_or(Vec::new(), |p| squares(&p.eta_k)),
+                oscillation.as_ref(),
+            ),
+            Estimator::Residual => (
+                residual.as_ref().map_or(Vec::new(), |r| r.squares().into()),
+                sweep.weighted_oscillation.as_ref(),
+            ),
+            Estimator::Certified => (
+                certificate
+                    .as_ref()
+                    .map_or(Vec::new(), |c| squares(&c.local)),
+                None,
+            ),
         };
-        let marking: Vec<f64> = driving
-            .iter()
-            .zip(&unseen)
-            .map(|(e, o)| e * e + o)
-            .collect();
-        let unseen = unseen.iter().sum::<f64>().sqrt();
+        if let Some(unseen) = unseen {
+            for (square, unseen) in marking.iter_mut().zip(unseen.squares()) {
+                *square += unseen;
+            }
+        }
+        let unseen = unseen.map_or(0.0, Squares::total);
         let bound = match settings.estimate.estimator {
             Estimator::Paper => marking.iter().sum::<f64>().sqrt(),
-            Estimator::Residual => root_sum(driving),
+            Estimator::Residual => residual.as_ref().map_or(0.0, Squares::total),
             Estimator::Certified => certificate.as_ref().map_or(0.0, |c| c.bound),
         };
-        let mut largest = 0.0f64;
-        for t in mesh.triangle_ids() {
-            let shape = mesh.shape(t);
-            let weight = shape.diameter().powi(2) * shape.area;
-            let square = [0, 1].map(|i| {
-                let mean = discrete.loads[i].mean(t.index());
-                weight * mean * mean / tension_weight(discrete, i, t.index(), weighted)
-            });
-            largest = largest.max(square[0] + square[1]);
-        }
+        let largest_contribution = match settings.estimate.estimator {
+            Estimator::Paper => sweep.largest_contribution,
+            Estimator::Residual | Estimator::Certified => sweep.weighted_contribution,
+        };
         let mut estimates = Estimates {
             paper,
             global_bound,
@@ -144,8 +136,8 @@ impl Estimates {
             contact_set,
             marking,
             unseen,
-            largest_contribution: largest.sqrt(),
-            energy: estimate::energy(mesh, discrete, solution),
+            largest_contribution,
+            energy: sweep.energy,
             bound,
             predicted: false,
             reachable: bound,
@@ -205,27 +197,13 @@ impl Estimates {
                 };
             }
         } else if let Some(residual) = &self.residual {
-            self.error_size = Some(RESIDUAL_SHARE * root_sum(residual));
+            self.error_size = Some(RESIDUAL_SHARE * residual.total());
         }
     }
 }
 
 /// The error over the residual estimator, from the measured quotients of 4 to 6.
 const RESIDUAL_SHARE: f64 = 0.2;
-
-/// The tension that the squares of an estimator of the energy norm are divided by; 1 for the paper's.
-fn tension_weight(
-    discrete: &DiscreteProblem,
-    membrane: usize,
-    triangle: usize,
-    weighted: bool,
-) -> f64 {
-    if weighted {
-        discrete.tension_mean[membrane][triangle]
-    } else {
-        1.0
-    }
-}
 
 /// Exponent of the unit of an estimator.
 pub(crate) fn bound_unit(estimator: Estimator, scale: Scale) -> i32 {

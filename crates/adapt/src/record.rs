@@ -1,7 +1,7 @@
 //! The numbers of one level: a row of the history, in the user's units.
 
 use contact::{DiscreteProblem, Reduction, Solution};
-use estimate::{Energy, Grade, root_sum};
+use estimate::{Energy, Grade, Squares};
 use fem_core::Mesh;
 use fem_core::scale::times_power_of_two;
 
@@ -135,8 +135,7 @@ impl LevelRecord {
                 )
             })
         };
-        let in_contact = || (0..mesh.vertex_count()).filter(|&j| solution.contact[j]);
-        let pressures = (0..mesh.vertex_count()).map(|j| solution.force[j] / discrete.dual_area[j]);
+        let contact = Contact::of(discrete, solution);
         let errors = estimates.errors.as_ref();
         let assurance = match certificate {
             Some(certificate) => Some(Assurance::of(
@@ -152,13 +151,8 @@ impl LevelRecord {
             vertices: mesh.vertex_count(),
             triangles: mesh.triangle_count(),
             unknowns: solution.info.unknowns,
-            contact_vertices: in_contact().count(),
-            contact_area: by(
-                in_contact()
-                    .map(|j| discrete.dual_area[j])
-                    .fold(0.0, |a, b| a + b),
-                scale.area(),
-            ),
+            contact_vertices: contact.vertices,
+            contact_area: by(contact.area, scale.area()),
             energy: by(energy, scale.energy()),
             energy_norm: by(norm, scale.energy_norm()),
             eta_k: estimates
@@ -174,8 +168,11 @@ impl LevelRecord {
             residual: estimates
                 .residual
                 .as_ref()
-                .map(|r| by(root_sum(r), scale.energy_norm())),
-            oscillation: by(root_sum(&estimates.oscillation), scale.force()),
+                .map(|r| by(r.total(), scale.energy_norm())),
+            oscillation: by(
+                estimates.oscillation.as_ref().map_or(0.0, Squares::total),
+                scale.force(),
+            ),
             error_bound: by(estimates.bound, bound_exponent),
             bound_kind,
             relative_bound: over(norm),
@@ -187,8 +184,8 @@ impl LevelRecord {
             reduction: solution.info.reduction,
             iterations: solution.info.iterations,
             kkt_residual: solution.info.kkt_residual,
-            contact_force: by(solution.force.iter().fold(0.0, |a, b| a + b), scale.force()),
-            max_action: by(pressures.fold(0.0, f64::max), scale.load),
+            contact_force: by(contact.force, scale.force()),
+            max_action: by(contact.pressure, scale.load),
             contact_area_error: estimates
                 .contact_set
                 .map(|c| by(c.area_error(), scale.area())),
@@ -197,12 +194,7 @@ impl LevelRecord {
                 .contact_set
                 .and_then(|c| c.hausdorff)
                 .map(|d| by(d, scale.length)),
-            smallest_gap: by(
-                (0..mesh.vertex_count())
-                    .map(|j| solution.gap(j))
-                    .fold(f64::INFINITY, f64::min),
-                scale.displacement(),
-            ),
+            smallest_gap: by(contact.gap, scale.displacement()),
             seconds_refine: 0.0,
             seconds_assemble: 0.0,
             seconds_solve: 0.0,
@@ -217,5 +209,47 @@ impl LevelRecord {
             eta_alg: certificate.map(|c| by(c.algebraic, scale.energy_norm())),
             assurance,
         })
+    }
+}
+
+/// What the vertices tell of the contact, found in one pass; scaled.
+struct Contact {
+    /// Vertices of the contact set.
+    vertices: usize,
+    /// Sum of their dual areas.
+    area: f64,
+    /// Sum of all forces.
+    force: f64,
+    /// The largest force over dual area; not negative.
+    pressure: f64,
+    /// The smallest gap.
+    gap: f64,
+}
+
+impl Contact {
+    fn of(discrete: &DiscreteProblem, solution: &Solution) -> Contact {
+        let mut contact = Contact {
+            vertices: 0,
+            area: 0.0,
+            force: 0.0,
+            pressure: 0.0,
+            gap: f64::INFINITY,
+        };
+        let [upper, lower] = &solution.displacement;
+        let forces = solution.force.iter().zip(&discrete.dual_area);
+        for (((u1, u2), (force, area)), &touches) in
+            upper.iter().zip(lower).zip(forces).zip(&solution.contact)
+        {
+            contact.gap = contact.gap.min(u1 - u2);
+            if touches {
+                contact.vertices += 1;
+                contact.area += area;
+            }
+            if *force != 0.0 {
+                contact.force += force;
+                contact.pressure = contact.pressure.max(force / area);
+            }
+        }
+        contact
     }
 }

@@ -195,6 +195,10 @@ pub fn fields(level: &Level, scale: Scale) -> LevelFields<'_> {
         let all = 0..level.mesh.triangle_count();
         all.map(|t| discrete.loads[i].mean(t)).collect()
     };
+    let oscillation = match &estimates.oscillation {
+        Some(oscillation) => oscillation.roots(),
+        None => vec![0.0; level.mesh.triangle_count()],
+    };
     let paper = estimates.paper.as_ref();
     LevelFields {
         level: level.number,
@@ -213,12 +217,12 @@ pub fn fields(level: &Level, scale: Scale) -> LevelFields<'_> {
         residual: estimates
             .residual
             .as_ref()
-            .map(|r| by(r, scale.energy_norm())),
+            .map(|r| Cow::Owned(by(&r.roots(), scale.energy_norm()).into_owned())),
         certified: estimates
             .certificate
             .as_ref()
             .map(|c| by(&c.local, scale.energy_norm())),
-        oscillation: Some(by(&estimates.oscillation, scale.force())),
+        oscillation: Some(Cow::Owned(by(&oscillation, scale.force()).into_owned())),
         f1_h: Cow::Owned(by(&mean(0), scale.load).into_owned()),
         f2_h: Cow::Owned(by(&mean(1), scale.load).into_owned()),
         generation: Cow::Borrowed(level.mesh.generation()),

@@ -5,7 +5,7 @@
 //! vertex without interior neighbours (a corner) takes the mean over the neighbours that have a value already, round by round.
 
 use contact::{DiscreteProblem, Solution};
-use fem_core::Mesh;
+use fem_core::{Mesh, Neighbour, TriangleId};
 
 /// The nodal action l_j on all vertices, boundary included; a pressure (force per area).
 ///
@@ -83,18 +83,20 @@ struct Around {
 }
 
 impl Around {
-    /// O(N) but for the sorting of what touches the boundary.
+    /// Finds the edges on the boundary in O(N) and sorts what touches them.
     fn of(mesh: &Mesh) -> Around {
-        let boundary = mesh.boundary();
-        let vertices: Vec<u32> = (0..boundary.len() as u32)
-            .filter(|&j| boundary[j as usize])
-            .collect();
+        let mut vertices = Vec::new();
         let mut pairs = Vec::new();
-        for v in mesh.triangles() {
-            for j in v.iter().filter(|j| boundary[j.index()]) {
-                pairs.extend(v.iter().filter(|k| *k != j).map(|k| (j.0, k.0)));
+        for (t, around) in mesh.neighbours().iter().enumerate() {
+            for (face, _) in (0..3).zip(around).filter(|a| *a.1 == Neighbour::BOUNDARY) {
+                let [vertex, end] = mesh.face(TriangleId(t as u32), face);
+                vertices.push(vertex.0);
+                pairs.push((vertex.0, end.0));
+                fan(mesh, t, (face + 1) % 3, |k| pairs.push((vertex.0, k)));
             }
         }
+        vertices.sort_unstable();
+        vertices.dedup();
         pairs.sort_unstable();
         pairs.dedup();
         let other = pairs.iter().map(|p| p.1).collect();
@@ -116,6 +118,21 @@ impl Around {
             Ok(at) => &self.other[self.start[at] as usize..self.start[at + 1] as usize],
             Err(_) => &[],
         }
+    }
+}
+
+/// Shows the neighbours of a boundary vertex counter-clockwise, but for the first one: from triangle `t`, in which the vertex has the number `corner`
+/// and the boundary runs from it to the next corner, to the triangle that ends at the boundary again.
+fn fan(mesh: &Mesh, t: usize, corner: usize, mut show: impl FnMut(u32)) {
+    let (mut t, mut corner) = (t, corner);
+    loop {
+        show(mesh.triangles()[t][(corner + 2) % 3].0);
+        // The edge from the vertex to the corner just shown is opposite to the next corner.
+        let Some((next, face)) = mesh.neighbours()[t][(corner + 1) % 3].get() else {
+            return;
+        };
+        // The neighbour has the same edge the other way round: the vertex comes first in it.
+        (t, corner) = (next.index(), (face + 1) % 3);
     }
 }
 

@@ -8,6 +8,7 @@
 //! - [`certificate`]: a guaranteed bound of the energy error;
 //! - [`mod@oscillation`]: what first-order elements do not see of the loads;
 //! - [`action`]: the action as a function, with values at boundary vertices;
+//! - [`mod@sweep`]: residual estimator, oscillation and energy in one pass;
 //! - [`mod@energy`]: J(u_h) and the energy norm of u_h;
 //! - [`exact`], [`errors`]: a known solution, and the true errors against it;
 //! - [`mod@contact_set`]: the contact set against the exact one;
@@ -15,7 +16,7 @@
 //! - [`mod@efficiency`]: the constants of (7.13) and (7.14) that a solution attains.
 //!
 //! All numbers are in scaled units, see [`fem_core::scale`]. Local arrays have one entry a triangle (or interior edge) in the order of the mesh
-//! and hold roots: the total is the root of the sum of their squares, [`root_sum`].
+//! and hold roots: the total is the root of the sum of their squares, [`root_sum`]. [`Squares`] are not yet rooted.
 
 pub mod action;
 pub mod certificate;
@@ -30,6 +31,8 @@ mod gradients;
 pub mod oscillation;
 pub mod paper;
 pub mod residual;
+pub mod squares;
+pub mod sweep;
 
 pub use action::{extend_to_boundary, nodal_action};
 pub use certificate::{
@@ -45,6 +48,8 @@ pub use global_bound::{GlobalBound, global_bound};
 pub use oscillation::oscillation;
 pub use paper::{Paper, paper};
 pub use residual::residual;
+pub use squares::Squares;
+pub use sweep::{Sweep, sweep};
 
 /// The total of local values: the root of the sum of their squares.
 pub fn root_sum(local: &[f64]) -> f64 {

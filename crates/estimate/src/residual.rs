@@ -10,6 +10,8 @@
 //!
 //! On the dual cell's share K cap D_j the hat function of j has the integral 11|K|/54 and each other one 7|K|/108. c_K is what
 //! action times gap leaves where the contact set ends inside an element; it is of higher order.
+//!
+//! This is the estimator as it is written; [`crate::sweep`] finds the same numbers together with others in a single pass.
 
 use contact::{DiscreteProblem, Solution};
 use fem_core::Mesh;
@@ -57,7 +59,7 @@ pub fn residual(mesh: &Mesh, problem: &DiscreteProblem, solution: &Solution) -> 
 
 /// c_K from the actions and gaps at the corners; not negative, whatever rounding left in the gaps.
 #[inline]
-fn contact_term(area: f64, action: [f64; 3], gap: [f64; 3]) -> f64 {
+pub(crate) fn contact_term(area: f64, action: [f64; 3], gap: [f64; 3]) -> f64 {
     let all: f64 = gap.iter().sum();
     let sum: f64 = (0..3)
         .map(|j| action[j] * (22.0 * gap[j] + 7.0 * (all - gap[j])))
