@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use crate::level::Level;
 use crate::output::{
-    EdgeFields, Ending, LevelFields, OutputError, RunFolder, Summary, peak_memory_mb,
+    EdgeFields, Ending, LevelFields, OutputError, RunFolder, Summary, Values, peak_memory_mb,
 };
 use crate::record::LevelRecord;
 use crate::run::{Observer, Reason};
@@ -181,29 +181,27 @@ fn scaled_points(level: &Level, scale: Scale) -> Cow<'_, [[f64; 2]]> {
     )
 }
 
-/// The fields of a level in the user's units.
+/// The fields of a level in the user's units, which are computed while they are written.
 pub fn fields(level: &Level, scale: Scale) -> LevelFields<'_> {
     let (solution, discrete, estimates) = (&level.solution, &level.discrete, &level.estimates);
     let count = level.mesh.vertex_count();
-    let gap: Vec<f64> = (0..count)
-        .map(|j| times_power_of_two(solution.gap(j), scale.displacement()))
-        .collect();
-    let action: Vec<f64> = (0..count)
-        .map(|j| times_power_of_two(solution.force[j] / discrete.dual_area[j], scale.load))
-        .collect();
+    let by = Values::scaled;
+    let gap = move |j| times_power_of_two(solution.gap(j), scale.displacement());
+    let action =
+        move |j: usize| times_power_of_two(solution.force[j] / discrete.dual_area[j], scale.load);
     let paper = estimates.paper.as_ref();
     LevelFields {
         level: level.number,
         error_bound: level.record.error_bound,
-        points: scaled_points(level, scale),
-        triangles: Cow::Borrowed(level.mesh.triangles()),
+        points: Values::scaled_points(level.mesh.points(), scale.length),
+        triangles: level.mesh.triangles().into(),
         u1: by(&solution.displacement[0], scale.displacement()),
         u2: by(&solution.displacement[1], scale.displacement()),
-        gap: Cow::Owned(gap),
+        gap: Values::by(count, gap),
         sigma: by(&solution.sigma, scale.force()),
         action_force: by(&solution.force, scale.force()),
-        action: Cow::Owned(action),
-        contact: Cow::Borrowed(&solution.contact),
+        action: Values::by(count, action),
+        contact: solution.contact.as_slice().into(),
         eta_k: paper.map(|p| by(&p.eta_k, scale.force())),
         eta_e: paper.map(|p| by(&p.eta_e_cell, scale.force())),
         residual: estimates
@@ -217,7 +215,7 @@ pub fn fields(level: &Level, scale: Scale) -> LevelFields<'_> {
         oscillation: Some(by(&estimates.oscillation, scale.force())),
         f1_h: by(&discrete.loads[0].mean, scale.load),
         f2_h: by(&discrete.loads[1].mean, scale.load),
-        generation: Cow::Borrowed(level.mesh.generation()),
-        region: Cow::Borrowed(level.mesh.region()),
+        generation: level.mesh.generation().into(),
+        region: level.mesh.region().into(),
     }
 }
