@@ -236,7 +236,7 @@ mod tests {
     /// A file with an array of doubles and one of bytes behind its text; the bytes look like the end of it.
     fn raw() -> Vec<u8> {
         let head = "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData><FieldData>\
-            <DataArray type=\"Float64\" Name=\"bound\" NumberOfTuples=\"2\" format=\"appended\" offset=\"0\"/></FieldData>\
+            <DataArray type=\"Float64\" Name=\"bound\" format=\"appended\" offset=\"0\"/></FieldData>\
             <Piece NumberOfPoints=\"7\"><CellData><DataArray type=\"UInt8\" Name=\"flag\" format=\"appended\" offset=\"24\"/></CellData>\
             </Piece></PolyData>\n<AppendedData encoding=\"raw\">\n_";
         [
@@ -308,7 +308,11 @@ mod tests {
                 "there are appended data twice",
             ),
             ("</AppendedData>\n", "", "`</VTKFile>` closes nothing"),
-            ("</VTKFile>\n", "</VTKFile>\n<!", "it ends inside a tag"),
+            (
+                "</VTKFile>\n",
+                "</VTKFile>\n<!",
+                "there is text where none belongs",
+            ),
         ] {
             assert_eq!(changed(from, to), Err(why.to_owned()), "{from} to {to}");
         }

@@ -170,7 +170,7 @@ impl Document<'_> {
 
 impl Array<'_> {
     /// Its element in the head; `offset`, its place in the block, moves on to the next.
-    fn element(&self, tuples: &str, offset: &mut u64) -> String {
+    pub fn element(&self, tuples: &str, offset: &mut u64) -> String {
         let Array {
             name,
             kind,

@@ -173,3 +173,25 @@ fn cells(corners: Values<'_, [VertexId; 3]>, vertices: usize) -> Vec<Array<'_>> 
         Array::new("types", "UInt8", 1, types, |t| [t]),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_beyond_32_bits_are_written_with_64() {
+        let most = i32::MAX as usize;
+        for (triangles, vertices, kind) in [
+            (5, 7, "Int32"),
+            (most / 3, most, "Int32"),
+            (most / 3 + 1, 7, "Int64"),
+            (5, most + 1, "Int64"),
+        ] {
+            let corners = Values::by(triangles, |_| [VertexId(0); 3]);
+            for array in &cells(corners, vertices)[..2] {
+                let element = array.element("", &mut 0);
+                assert!(element.contains(kind), "{triangles} {vertices} {element}");
+            }
+        }
+    }
+}
