@@ -231,6 +231,10 @@ fn reads_back(name: &str, extra: &[&str]) {
             ("cell:eta_e", fields.eta_e.as_ref().unwrap_or(&empty)),
             ("cell:residual", fields.residual.as_ref().unwrap_or(&empty)),
             (
+                "cell:certified",
+                fields.certified.as_ref().unwrap_or(&empty),
+            ),
+            (
                 "cell:oscillation",
                 fields.oscillation.as_ref().unwrap_or(&empty),
             ),
