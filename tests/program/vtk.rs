@@ -3,12 +3,12 @@
 //! The test makes its own Python environment under the target folder (`python3 -m venv`, `pip install vtk`). Where that cannot be
 //! done it says so and leaves the comparison out, unless `MEMBRANES_REQUIRE_VTK` is set.
 
-use std::borrow::Cow;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+use adapt::output::Values;
 use adapt::{Level, Reason};
 use serde_json::Value;
 
@@ -209,11 +209,8 @@ fn reads_back(name: &str, extra: &[&str]) {
         let file = run.out.join(format!("level_{:04}.vtu", level.number));
         let file = file.to_str().expect("a path");
         let fields = adapt::recorder::fields(level, scale);
-        let points: Vec<f64> = fields
-            .points
-            .iter()
-            .flat_map(|p| [p[0], p[1], 0.0])
-            .collect();
+        let points = fields.points.to_vec();
+        let points: Vec<f64> = points.iter().flat_map(|p| [p[0], p[1], 0.0]).collect();
         same_bits(python, file, "Points", &points);
         let corners = level
             .mesh
@@ -222,7 +219,7 @@ fn reads_back(name: &str, extra: &[&str]) {
             .flatten()
             .map(|v| i64::from(v.0));
         same_numbers(python, file, "connectivity", corners);
-        let empty = Cow::Borrowed(&[][..]);
+        let empty = Values::from(Vec::new());
         for (array, values) in [
             ("point:u1", &fields.u1),
             ("point:u2", &fields.u2),
@@ -234,31 +231,35 @@ fn reads_back(name: &str, extra: &[&str]) {
             ("cell:eta_e", fields.eta_e.as_ref().unwrap_or(&empty)),
             ("cell:residual", fields.residual.as_ref().unwrap_or(&empty)),
             (
+                "cell:certified",
+                fields.certified.as_ref().unwrap_or(&empty),
+            ),
+            (
                 "cell:oscillation",
                 fields.oscillation.as_ref().unwrap_or(&empty),
             ),
             ("cell:f1_h", &fields.f1_h),
             ("cell:f2_h", &fields.f2_h),
         ] {
-            same_bits(python, file, array, values);
+            same_bits(python, file, array, &values.to_vec());
         }
         same_numbers(
             python,
             file,
             "point:contact",
-            fields.contact.iter().map(|&c| i64::from(c)),
+            fields.contact.to_vec().into_iter().map(i64::from),
         );
         same_numbers(
             python,
             file,
             "cell:generation",
-            fields.generation.iter().map(|&g| i64::from(g)),
+            fields.generation.to_vec().into_iter().map(i64::from),
         );
         same_numbers(
             python,
             file,
             "cell:region",
-            fields.region.iter().map(|&r| i64::from(r)),
+            fields.region.to_vec().into_iter().map(i64::from),
         );
         same_bits(python, file, "field:error_bound", &[fields.error_bound]);
         same_numbers(

@@ -74,12 +74,11 @@ impl Level {
     ) -> Result<Level, LevelError> {
         let settings = context.settings;
         let clock = Instant::now();
-        let mut mesh = Mesh::clone(&self.mesh);
         let children = match settings.mark.strategy {
             Strategy::Uniform => Children::Four,
             _ => settings.mark.children,
         };
-        let refinement = mesh.refine(marked, children)?;
+        let (mesh, refinement) = self.mesh.refined(marked, children)?;
         let carried = Start::prolong(&self.solution, &mesh, refinement.old_vertices);
         // First-order elements: the error goes like the root of the number of vertices at best.
         let growth = self.mesh.vertex_count() as f64 / mesh.vertex_count() as f64;

@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use crate::level::Level;
 use crate::output::{
-    EdgeFields, Ending, LevelFields, OutputError, RunFolder, Summary, peak_memory_mb,
+    EdgeFields, Ending, LevelFields, OutputError, RunFolder, Summary, Values, peak_memory_mb,
 };
 use crate::record::LevelRecord;
 use crate::run::{Observer, Reason};
@@ -181,51 +181,54 @@ fn scaled_points(level: &Level, scale: Scale) -> Cow<'_, [[f64; 2]]> {
     )
 }
 
-/// The fields of a level in the user's units.
+/// The fields of a level in the user's units, which are computed while they are written.
 pub fn fields(level: &Level, scale: Scale) -> LevelFields<'_> {
     let (solution, discrete, estimates) = (&level.solution, &level.discrete, &level.estimates);
     let count = level.mesh.vertex_count();
-    let gap: Vec<f64> = (0..count)
-        .map(|j| times_power_of_two(solution.gap(j), scale.displacement()))
-        .collect();
-    let action: Vec<f64> = (0..count)
-        .map(|j| times_power_of_two(solution.force[j] / discrete.dual_area[j], scale.load))
-        .collect();
-    let mean = |i: usize| -> Vec<f64> {
-        let all = 0..level.mesh.triangle_count();
-        all.map(|t| discrete.loads[i].mean(t)).collect()
+    let by = Values::scaled;
+    let gap = move |j| times_power_of_two(solution.gap(j), scale.displacement());
+    let action =
+        move |j: usize| times_power_of_two(solution.force[j] / discrete.dual_area[j], scale.load);
+    let triangles = level.mesh.triangle_count();
+    let mean = |i: usize| {
+        let load = &discrete.loads[i];
+        move |t| times_power_of_two(load.mean(t), scale.load)
     };
-    let oscillation = match &estimates.oscillation {
-        Some(oscillation) => oscillation.roots(),
-        None => vec![0.0; level.mesh.triangle_count()],
+    let oscillation = move |t: usize| {
+        let square = estimates
+            .oscillation
+            .as_ref()
+            .map_or(0.0, |o| o.squares()[t]);
+        times_power_of_two(square.sqrt(), scale.force())
     };
     let paper = estimates.paper.as_ref();
     LevelFields {
         level: level.number,
         error_bound: level.record.error_bound,
-        points: scaled_points(level, scale),
-        triangles: Cow::Borrowed(level.mesh.triangles()),
+        points: Values::scaled_points(level.mesh.points(), scale.length),
+        triangles: level.mesh.triangles().into(),
         u1: by(&solution.displacement[0], scale.displacement()),
         u2: by(&solution.displacement[1], scale.displacement()),
-        gap: Cow::Owned(gap),
+        gap: Values::by(count, gap),
         sigma: by(&solution.sigma, scale.force()),
         action_force: by(&solution.force, scale.force()),
-        action: Cow::Owned(action),
-        contact: Cow::Borrowed(&solution.contact),
+        action: Values::by(count, action),
+        contact: solution.contact.as_slice().into(),
         eta_k: paper.map(|p| by(&p.eta_k, scale.force())),
         eta_e: paper.map(|p| by(&p.eta_e_cell, scale.force())),
-        residual: estimates
-            .residual
-            .as_ref()
-            .map(|r| Cow::Owned(by(&r.roots(), scale.energy_norm()).into_owned())),
+        residual: estimates.residual.as_ref().map(|r| {
+            let root =
+                move |t: usize| times_power_of_two(r.squares()[t].sqrt(), scale.energy_norm());
+            Values::by(triangles, root)
+        }),
         certified: estimates
             .certificate
             .as_ref()
             .map(|c| by(&c.local, scale.energy_norm())),
-        oscillation: Some(Cow::Owned(by(&oscillation, scale.force()).into_owned())),
-        f1_h: Cow::Owned(by(&mean(0), scale.load).into_owned()),
-        f2_h: Cow::Owned(by(&mean(1), scale.load).into_owned()),
-        generation: Cow::Borrowed(level.mesh.generation()),
-        region: Cow::Borrowed(level.mesh.region()),
+        oscillation: Some(Values::by(triangles, oscillation)),
+        f1_h: Values::by(triangles, mean(0)),
+        f2_h: Values::by(triangles, mean(1)),
+        generation: level.mesh.generation().into(),
+        region: level.mesh.region().into(),
     }
 }

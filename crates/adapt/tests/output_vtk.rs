@@ -45,8 +45,50 @@ fn vtp(mesh: &Mesh) -> Vec<u8> {
     bytes
 }
 
+/// The same file with its arrays inline in base64, since vtkio reads no raw bytes. Every array must begin where the one before
+/// it ended, and nothing but the end of the file may follow the last.
+fn inline(bytes: &[u8]) -> String {
+    let start = b"<AppendedData encoding=\"raw\">\n_";
+    let at = bytes.windows(start.len()).position(|w| w == start);
+    let (head, block) = bytes.split_at(at.expect("a block"));
+    let block = &block[start.len()..];
+    let head = std::str::from_utf8(head).expect("text");
+    let (mut text, mut read) = (String::new(), 0);
+    for part in head.split_inclusive("/>") {
+        let Some((tag, offset)) = part.split_once(" format=\"appended\" offset=\"") else {
+            text += part;
+            continue;
+        };
+        assert_eq!(offset, format!("{read}\"/>"));
+        let length: [u8; 8] = block[read..read + 8].try_into().expect("eight bytes");
+        let end = read + 8 + u64::from_le_bytes(length) as usize;
+        text += &format!(
+            "{tag} format=\"binary\">{}</DataArray>",
+            base64(&block[read..end])
+        );
+        read = end;
+    }
+    assert_eq!(&block[read..], b"\n</AppendedData>\n</VTKFile>\n");
+    text + "</VTKFile>\n"
+}
+
+fn base64(bytes: &[u8]) -> String {
+    let digits = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::new();
+    for group in bytes.chunks(3) {
+        let mut word = [0; 4];
+        word[1..=group.len()].copy_from_slice(group);
+        let word = u32::from_be_bytes(word);
+        for k in 0..4 {
+            let digit = digits[(word >> (18 - 6 * k)) as usize & 63];
+            text.push(if k > group.len() { '=' } else { digit as char });
+        }
+    }
+    text
+}
+
 fn read_vtu(bytes: &[u8]) -> UnstructuredGridPiece {
-    let data = Vtk::parse_xml(bytes).unwrap().data;
+    let data = Vtk::parse_xml(inline(bytes).as_bytes()).unwrap().data;
     match data {
         DataSet::UnstructuredGrid { mut pieces, .. } if pieces.len() == 1 => {
             match pieces.remove(0) {
@@ -140,7 +182,7 @@ fn a_level_reads_back_to_the_bit() {
             let read = bits(buffer(&piece.data.point, name));
             assert_eq!(read, bits_of(&awkward(n, salt)), "{name}");
         }
-        let contact: Vec<u8> = fields.contact.iter().map(|&c| c.into()).collect();
+        let contact = fields.contact.to_vec().into_iter().map(u8::from).collect();
         assert_eq!(buffer(&piece.data.point, "contact"), &IOBuffer::U8(contact));
 
         assert_eq!(names(&piece.data.cell), CELL_ARRAYS);
@@ -163,17 +205,28 @@ fn a_level_reads_back_to_the_bit() {
 #[test]
 fn the_head_of_a_level_says_what_the_reader_needs() {
     let mesh = triangle();
-    let text = String::from_utf8(vtu(level_fields(&mesh, 3))).unwrap();
-    // 3 as Int64 and 0.30000000000000004 as Float64, each after its length 8 as UInt64, little endian.
+    let bytes = vtu(level_fields(&mesh, 3));
     let head = "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
-                header_type=\"UInt64\"><UnstructuredGrid><FieldData>\
-                <DataArray type=\"Int64\" Name=\"level\" NumberOfTuples=\"1\" format=\"binary\">\
-                CAAAAAAAAAADAAAAAAAAAA==</DataArray>\
-                <DataArray type=\"Float64\" Name=\"error_bound\" NumberOfTuples=\"1\" format=\"binary\">\
-                CAAAAAAAAAA0MzMzMzPTPw==</DataArray></FieldData>\
-                <Piece NumberOfPoints=\"3\" NumberOfCells=\"1\">";
-    assert!(text.starts_with(head), "{}", &text[..head.len() + 40]);
-    assert!(text.ends_with("</VTKFile>\n"));
+                header_type=\"UInt64\">\n<UnstructuredGrid>\n<FieldData>\n\
+                <DataArray type=\"Int64\" Name=\"level\" NumberOfTuples=\"1\" format=\"appended\" offset=\"0\"/>\n\
+                <DataArray type=\"Float64\" Name=\"error_bound\" NumberOfTuples=\"1\" format=\"appended\" offset=\"16\"/>\n\
+                </FieldData>\n<Piece NumberOfPoints=\"3\" NumberOfCells=\"1\">\n<PointData>\n\
+                <DataArray type=\"Float64\" Name=\"u1\" format=\"appended\" offset=\"32\"/>\n";
+    assert!(bytes.starts_with(head.as_bytes()));
+    for element in [
+        "type=\"UInt8\" Name=\"contact\" ",
+        "type=\"Int32\" Name=\"generation\" ",
+        "type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\" ",
+        "type=\"Int32\" Name=\"connectivity\" ",
+        "type=\"Int32\" Name=\"offsets\" ",
+        "type=\"UInt8\" Name=\"types\" ",
+    ] {
+        assert!(inline(&bytes).contains(element), "{element}");
+    }
+    // 3 as Int64 and 0.30000000000000004 as Float64, each after its length 8 as UInt64, little endian.
+    let block = b"<AppendedData encoding=\"raw\">\n_\x08\0\0\0\0\0\0\0\x03\0\0\0\0\0\0\0\
+                  \x08\0\0\0\0\0\0\0\x34\x33\x33\x33\x33\x33\xd3\x3f";
+    assert!(bytes.windows(block.len()).any(|w| w == block));
 }
 
 #[test]
@@ -227,6 +280,41 @@ fn one_triangle_has_no_interior_edge_and_still_a_file() {
     let text = String::from_utf8(vtp(&triangle())).unwrap();
     assert!(text.contains("NumberOfPoints=\"3\""), "{text}");
     assert!(!text.contains("NumberOfLines=\"1\""), "{text}");
+}
+
+/// Larger than the blocks that are written at a time.
+#[test]
+fn a_level_of_many_blocks_reads_back_to_the_bit() {
+    let mesh = squares(100);
+    let piece = read_vtu(&vtu(level_fields(&mesh, 3)));
+    let (n, m) = (mesh.vertex_count(), mesh.triangle_count());
+    assert!(n > 10_000 && m == 20_000);
+    assert_eq!(
+        bits(buffer(&piece.data.point, "action")),
+        bits_of(&awkward(n, 6))
+    );
+    assert_eq!(
+        bits(buffer(&piece.data.cell, "f2_h")),
+        bits_of(&awkward(m, 13))
+    );
+    let VertexNumbers::XML { connectivity, .. } = &piece.cells.cell_verts else {
+        panic!("not from XML");
+    };
+    let vertices = mesh.triangles().iter().flatten();
+    let vertices = vertices.map(|v| u64::from(v.0));
+    assert!(vertices.eq(connectivity.iter().copied()));
+}
+
+/// The arrays at the types of the file, and a text of a few thousand bytes.
+#[test]
+fn a_file_is_hardly_larger_than_its_arrays() {
+    let mesh = squares(100);
+    let (n, m) = (mesh.vertex_count(), mesh.triangle_count());
+    let point = 3 * 8 + 6 * 8 + 1;
+    let cell = 7 * 8 + 2 * 4 + 3 * 4 + 4 + 1;
+    let arrays = n * point + m * cell;
+    let size = vtu(level_fields(&mesh, 3)).len();
+    assert!((arrays..arrays + 4000).contains(&size), "{size}, {arrays}");
 }
 
 #[test]

@@ -18,6 +18,7 @@
 //! Nothing in here prints.
 
 mod action;
+mod appended;
 mod base64;
 mod certificate;
 mod columns;

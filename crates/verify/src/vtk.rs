@@ -1,12 +1,15 @@
 //! VTK XML files as a run writes them, read without the crate that wrote them.
 //!
-//! One piece, arrays inline in base64 behind a 64-bit length, little endian, not compressed. This reader takes nothing else, and
-//! every mistake in a file is a message: no length or number in it is believed before it was checked against the bytes that
-//! are there. `vtkio`, which writes these files, keeps no field data when it reads.
+//! One piece, arrays behind a 64-bit length, inline in base64 or as raw bytes behind the text, little endian, not compressed. This
+//! reader takes nothing else, and every mistake in a file is a message: no length or number in it is believed before it was checked
+//! against the bytes that are there. `vtkio` keeps no field data when it reads, and reads no raw bytes.
+
+mod tag;
 
 use std::collections::HashMap;
 
-use crate::base64;
+use self::tag::{Kind, Tag};
+use crate::appended::Appended;
 
 /// The numbers of an array.
 #[derive(Clone, PartialEq, Debug)]
@@ -53,7 +56,8 @@ impl VtkFile {
     /// # Errors
     /// What is wrong with the file, in words.
     pub fn parse(bytes: &[u8], kind: &str) -> Result<VtkFile, String> {
-        let text = std::str::from_utf8(bytes).map_err(|_| "it is not text".to_owned())?;
+        let (text, mut appended) = Appended::split(bytes)?;
+        let text = std::str::from_utf8(text).map_err(|_| "it is not text".to_owned())?;
         let mut file = VtkFile::default();
         let mut open: Vec<&str> = Vec::new();
         let mut pieces = 0;
@@ -97,10 +101,16 @@ impl VtkFile {
                     } else {
                         &rest[..length]
                     };
-                    file.arrays.push(tag.array(place, data)?);
+                    file.arrays.push(tag.array(place, data, appended.as_mut())?);
                     if tag.kind == Kind::Open {
                         rest = &rest[length..];
                     }
+                }
+                ("AppendedData", ["VTKFile"]) => {
+                    tag.check_encoding()?;
+                    let block = appended.take().ok_or("there are appended data twice")?;
+                    rest = std::str::from_utf8(block.tail())
+                        .map_err(|_| "there are bytes behind the last array".to_owned())?;
                 }
                 (_, ["VTKFile", data, "Piece"]) if *data == kind => {}
                 _ => return Err(format!("`<{}>` does not belong there", tag.name)),
@@ -195,139 +205,6 @@ fn check_length(name: &str, found: usize, expected: usize) -> Result<(), String>
     }
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Kind {
-    Open,
-    Close,
-    Empty,
-}
-
-struct Tag<'a> {
-    kind: Kind,
-    name: &'a str,
-    attributes: Vec<(&'a str, &'a str)>,
-}
-
-impl<'a> Tag<'a> {
-    /// What stands between `<` and `>`.
-    fn parse(inside: &'a str) -> Result<Tag<'a>, String> {
-        let (kind, inside) = match (inside.strip_prefix('/'), inside.strip_suffix('/')) {
-            (Some(rest), _) => (Kind::Close, rest),
-            (None, Some(rest)) => (Kind::Empty, rest),
-            (None, None) => (Kind::Open, inside),
-        };
-        let (name, mut rest) = inside
-            .split_once(char::is_whitespace)
-            .unwrap_or((inside, ""));
-        let mut attributes = Vec::new();
-        let broken = || format!("the tag `{name}` is malformed");
-        loop {
-            rest = rest.trim_start();
-            if rest.is_empty() {
-                break;
-            }
-            let (key, after) = rest.split_once("=\"").ok_or_else(broken)?;
-            let (value, after) = after.split_once('"').ok_or_else(broken)?;
-            attributes.push((key, value));
-            rest = after;
-        }
-        Ok(Tag {
-            kind,
-            name,
-            attributes,
-        })
-    }
-
-    fn attribute(&self, name: &str) -> Option<&'a str> {
-        let found = self.attributes.iter().find(|(key, _)| *key == name);
-        found.map(|(_, value)| *value)
-    }
-
-    fn check_header(&self, kind: &str) -> Result<(), String> {
-        for (name, expected) in [
-            ("type", Some(kind)),
-            ("byte_order", Some("LittleEndian")),
-            ("header_type", Some("UInt64")),
-            ("version", Some("1.0")),
-            ("compressor", None),
-        ] {
-            let found = self.attribute(name);
-            if found != expected {
-                let [found, expected] = [found, expected].map(|v| v.unwrap_or("absent"));
-                return Err(format!("`{name}` is `{found}` instead of `{expected}`"));
-            }
-        }
-        Ok(())
-    }
-
-    fn array(&self, place: &str, text: &str) -> Result<Array, String> {
-        let name = self.attribute("Name").ok_or("an array has no name")?;
-        if self.attribute("format") != Some("binary") {
-            return Err(format!("the array `{name}` is not in base64"));
-        }
-        let bytes = base64::decode(text.trim().as_bytes())
-            .ok_or_else(|| format!("the array `{name}` is not valid base64"))?;
-        let (head, data) = bytes
-            .split_first_chunk::<8>()
-            .ok_or_else(|| format!("the array `{name}` has no length"))?;
-        if u64::from_le_bytes(*head) != data.len() as u64 {
-            return Err(format!("the array `{name}` is not as long as it says"));
-        }
-        let values = match self.attribute("type") {
-            Some("Float64") => numbers(data, f64::from_le_bytes).map(Values::Real),
-            Some("Int64") => numbers(data, i64::from_le_bytes).map(Values::Integer),
-            Some("Int32") => {
-                numbers(data, |b| i64::from(i32::from_le_bytes(b))).map(Values::Integer)
-            }
-            Some("UInt8") => Some(Values::Integer(
-                data.iter().map(|&b| i64::from(b)).collect(),
-            )),
-            // Nothing that is counted comes near 2^63; what does is out of range wherever it is used.
-            Some("UInt64") => numbers(data, |b| {
-                i64::try_from(u64::from_le_bytes(b)).unwrap_or(i64::MAX)
-            })
-            .map(Values::Integer),
-            other => {
-                let other = other.unwrap_or("absent");
-                return Err(format!("the array `{name}` has the unknown type `{other}`"));
-            }
-        };
-        let values = values.ok_or_else(|| format!("the array `{name}` ends inside a number"))?;
-        let components = if name == "Points" { 3 } else { 1 };
-        let tuples = values.len() / components;
-        for (key, expected) in [
-            ("NumberOfComponents", components),
-            ("NumberOfTuples", tuples),
-        ] {
-            if self
-                .attribute(key)
-                .is_some_and(|v| v.parse() != Ok(expected))
-            {
-                return Err(format!("`{key}` of the array `{name}` is wrong"));
-            }
-        }
-        let bound = |key: &str| match self.attribute(key).map(str::parse) {
-            None => Ok(None),
-            Some(Ok(value)) => Ok(Some(value)),
-            Some(Err(_)) => Err(format!("`{key}` of the array `{name}` is no number")),
-        };
-        let range = bound("RangeMin")?.zip(bound("RangeMax")?);
-        Ok(Array {
-            place: place.to_owned(),
-            name: name.to_owned(),
-            values,
-            range: range.map(|(low, high)| [low, high]),
-        })
-    }
-}
-
-/// The numbers in a row of bytes; `None` if the last one is not complete.
-fn numbers<const N: usize, T>(data: &[u8], read: impl Fn([u8; N]) -> T) -> Option<Vec<T>> {
-    let (chunks, rest) = data.as_chunks::<N>();
-    rest.is_empty()
-        .then(|| chunks.iter().map(|&c| read(c)).collect())
-}
-
 impl Array {
     /// Whether the smallest and largest number are those that the file states beside the array.
     pub fn range_holds(&self) -> bool {
@@ -355,6 +232,115 @@ mod tests {
     const FILE: &str = "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"><PolyData><FieldData>\
         <DataArray type=\"Int64\" Name=\"level\" format=\"binary\">CAAAAAAAAAABAAAAAAAAAA==</DataArray></FieldData>\
         <Piece NumberOfPoints=\"7\"><CellData/><Points></Points></Piece></PolyData></VTKFile>\n";
+
+    /// A file with an array of doubles and one of bytes behind its text; the bytes look like the end of it.
+    fn raw() -> Vec<u8> {
+        let head = "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData><FieldData>\
+            <DataArray type=\"Float64\" Name=\"bound\" format=\"appended\" offset=\"0\"/></FieldData>\
+            <Piece NumberOfPoints=\"7\"><CellData><DataArray type=\"UInt8\" Name=\"flag\" format=\"appended\" offset=\"24\"/></CellData>\
+            </Piece></PolyData>\n<AppendedData encoding=\"raw\">\n_";
+        [
+            head.as_bytes(),
+            &16u64.to_le_bytes(),
+            &0.1f64.to_le_bytes(),
+            &(-2.5f64).to_le_bytes(),
+            &7u64.to_le_bytes(),
+            b"\n</App_",
+            b"\n</AppendedData>\n</VTKFile>\n",
+        ]
+        .concat()
+    }
+
+    fn changed(from: &str, to: &str) -> Result<VtkFile, String> {
+        let raw = raw();
+        let at = raw.windows(from.len()).position(|w| w == from.as_bytes());
+        let at = at.expect("the text");
+        let bytes = [&raw[..at], to.as_bytes(), &raw[at + from.len()..]].concat();
+        VtkFile::parse(&bytes, "PolyData")
+    }
+
+    #[test]
+    fn a_small_file_with_appended_data() {
+        let file = VtkFile::parse(&raw(), "PolyData").unwrap();
+        assert_eq!(file.count("NumberOfPoints"), Ok(7));
+        let bound = file.real("FieldData", "bound", 2);
+        assert_eq!(bound, Ok(Some(vec![0.1, -2.5])));
+        let flag = b"\n</App_".iter().map(|&b| i64::from(b)).collect();
+        assert_eq!(file.integer("CellData", "flag", 7), Ok(Some(flag)));
+    }
+
+    #[test]
+    fn what_is_wrong_with_appended_data_is_said() {
+        for (from, to, why) in [
+            (
+                "offset=\"24\"",
+                "offset=\"16\"",
+                "the array `flag` has the offset `16` instead of `24`",
+            ),
+            (
+                "offset=\"0\"",
+                "",
+                "the array `bound` has the offset `absent` instead of `0`",
+            ),
+            (
+                "encoding=\"raw\"",
+                "encoding=\"base64\"",
+                "the appended data are not raw",
+            ),
+            ("\"raw\">", "\"raw\"/>", "the appended data are not raw"),
+            ("\n_", "\n", "the appended data do not begin with `_`"),
+            ("\x07\0", "\x07\x01", "the array `flag` is cut off"),
+            ("\x07\0", "\x06\0", "there is text where none belongs"),
+            ("<AppendedData", "<AppendedDates", "it is not text"),
+            (
+                "type=\"UInt8\"",
+                "type=\"Int32\"",
+                "the array `flag` ends inside a number",
+            ),
+            (
+                "\"bound\" format=\"appended\"",
+                "\"bound\" format=\"ascii\"",
+                "the array `bound` is neither in base64 nor appended",
+            ),
+            (
+                "</AppendedData>\n",
+                "</AppendedData><AppendedData encoding=\"raw\">_",
+                "there are appended data twice",
+            ),
+            ("</AppendedData>\n", "", "`</VTKFile>` closes nothing"),
+            (
+                "</VTKFile>\n",
+                "</VTKFile>\n<!",
+                "there is text where none belongs",
+            ),
+        ] {
+            assert_eq!(changed(from, to), Err(why.to_owned()), "{from} to {to}");
+        }
+    }
+
+    #[test]
+    fn every_cut_and_every_changed_byte_of_appended_data_is_a_message_or_another_file() {
+        let raw = raw();
+        let whole = VtkFile::parse(&raw, "PolyData").unwrap();
+        let end = raw.len() - 1;
+        for cut in 0..end {
+            assert!(VtkFile::parse(&raw[..cut], "PolyData").is_err(), "{cut}");
+        }
+        let text = raw.windows(2).position(|w| w == b"<A").expect("a block");
+        let cut = VtkFile::parse(&raw[..text], "PolyData");
+        let why = "the array `bound` is missing, since there are no appended data";
+        assert_eq!(cut, Err(why.to_owned()));
+        let mut accepted = 0;
+        for at in 0..end {
+            for byte in [0, b'<', b'>', b'"', b'9', b'=', b'/', 255] {
+                let mut bytes = raw.clone();
+                bytes[at] = byte;
+                accepted +=
+                    usize::from(VtkFile::parse(&bytes, "PolyData").is_ok_and(|f| f == whole));
+            }
+        }
+        assert!(accepted < 120, "{accepted}");
+    }
 
     #[test]
     fn a_small_file() {

@@ -180,10 +180,10 @@ fn meshes() {
     );
     let change = |c: &Copy| c.reals(LAST, "Points", |p| p[0] = f64::NAN);
     found("no number", change, &["value 0 of `Points` is NaN"]);
-    let change = |c: &Copy| c.integer::<8>(LAST, "connectivity", 4, 3);
+    let change = |c: &Copy| c.integer::<4>(LAST, "connectivity", 4, 3);
     found("a corner", change, &["`cover of the domain`"]);
-    for wild in [1 << 20, 1 << 33, u64::MAX] {
-        let change = |c: &Copy| c.integer::<8>(LAST, "connectivity", 4, wild);
+    for wild in [1 << 20, 1 << 31, u64::MAX] {
+        let change = |c: &Copy| c.integer::<4>(LAST, "connectivity", 4, wild);
         found("no such vertex", change, &["vertex"]);
     }
     let change = |c: &Copy| c.replace(LAST, "NumberOfPoints=\"", "NumberOfPoints=\"1");
@@ -194,12 +194,12 @@ fn meshes() {
     found("a name", change, &["`residues` is not known"]);
     let change = |c: &Copy| {
         c.replace(
-            LAST,
-            "Name=\"eta_K\" format=\"binary\" RangeMin=\"",
-            "Name=\"eta_K\" format=\"binary\" RangeMin=\"1",
+            "edges_0002.vtp",
+            "Name=\"eta_e\" format=\"binary\" RangeMin=\"",
+            "Name=\"eta_e\" format=\"binary\" RangeMin=\"1",
         )
     };
-    found("a range", change, &["the range beside the array `eta_K`"]);
+    found("a range", change, &["the range beside the array `eta_e`"]);
 }
 
 #[test]
@@ -268,8 +268,8 @@ fn any_value_of_any_array() {
         }
         let (at, other) = (random(3 * triangles), random(count) as u64);
         let before = honest.bytes_of(LAST, "connectivity");
-        if before[8 * at..8 * at + 8] != other.to_le_bytes() {
-            let change = |c: &Copy| c.integer::<8>(LAST, "connectivity", at, other);
+        if before[4 * at..4 * at + 4] != other.to_le_bytes()[..4] {
+            let change = |c: &Copy| c.integer::<4>(LAST, "connectivity", at, other);
             refused(format!("connectivity {at}"), &change);
         }
     }

@@ -1,6 +1,7 @@
 //! A copy of a finished run that is changed: single numbers of its files, with or without checksums that fit.
 
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use adapt::output::checksum::checksum;
@@ -11,12 +12,14 @@ pub struct Copy {
     folder: tempfile::TempDir,
 }
 
-/// Where an array stands in the text of a file.
+/// Where an array stands in a file.
 struct Place {
-    /// The attributes of its tag.
-    tag: std::ops::Range<usize>,
-    /// Its base64.
-    data: std::ops::Range<usize>,
+    /// Its tag with the attributes.
+    tag: Range<usize>,
+    /// Its base64, or its bytes in the block behind the text, the length included.
+    data: Range<usize>,
+    /// Whether it stands in that block.
+    raw: bool,
 }
 
 impl Copy {
@@ -39,34 +42,52 @@ impl Copy {
 
     /// Changes a file as text.
     pub fn text(&self, name: &str, change: impl FnOnce(String) -> String) {
-        let before = fs::read_to_string(self.file(name)).expect("text");
+        let text = |bytes| String::from_utf8(bytes).expect("text");
+        self.change(name, |bytes| change(text(bytes)).into_bytes());
+    }
+
+    /// Changes a file.
+    pub fn change(&self, name: &str, change: impl FnOnce(Vec<u8>) -> Vec<u8>) {
+        let before = fs::read(self.file(name)).expect("a file");
         let after = change(before.clone());
-        assert_ne!(before, after, "nothing was changed in {name}");
+        assert!(before != after, "nothing was changed in {name}");
         fs::write(self.file(name), after).expect("written");
     }
 
+    /// Puts other text in the place where a text first stands.
     pub fn replace(&self, name: &str, from: &str, to: &str) {
-        self.text(name, |text| text.replacen(from, to, 1));
+        self.change(name, |bytes| {
+            let at = position(&bytes, from.as_bytes()).expect("the text");
+            [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()
+        });
+    }
+
+    /// Cuts a file in the middle.
+    pub fn halve(&self, name: &str) {
+        self.change(name, |bytes| bytes[..bytes.len() / 2].to_vec());
     }
 
     /// Changes the bytes of an array of a VTK file, and takes its stated range away.
     fn bytes(&self, name: &str, array: &str, change: impl FnOnce(&mut [u8])) {
-        self.text(name, |text| {
-            let place = find(&text, array);
-            let mut bytes = decode(&text[place.data.clone()]);
-            // The first eight are the length.
+        self.change(name, |mut file| {
+            let place = find(&file, array);
+            if place.raw {
+                // The first eight are the length.
+                change(&mut file[place.data][8..]);
+                return file;
+            }
+            let mut bytes = decode(&file[place.data.clone()]);
             change(&mut bytes[8..]);
-            let tag: Vec<&str> = text[place.tag.clone()]
-                .split(' ')
-                .filter(|a| !a.starts_with("Range"))
-                .collect();
-            format!(
-                "{}{}>{}{}",
-                &text[..place.tag.start],
-                tag.join(" "),
-                encode(&bytes),
-                &text[place.data.end..]
-            )
+            let tag = std::str::from_utf8(&file[place.tag.clone()]).expect("text");
+            let tag: Vec<&str> = tag.split(' ').filter(|a| !a.starts_with("Range")).collect();
+            [
+                &file[..place.tag.start],
+                tag.join(" ").as_bytes(),
+                b">",
+                encode(&bytes).as_bytes(),
+                &file[place.data.end..],
+            ]
+            .concat()
         });
     }
 
@@ -91,16 +112,18 @@ impl Copy {
 
     /// The doubles of an array.
     pub fn read(&self, name: &str, array: &str) -> Vec<f64> {
-        let text = fs::read_to_string(self.file(name)).expect("text");
-        let bytes = decode(&text[find(&text, array).data]);
-        let (rows, _) = bytes[8..].as_chunks::<8>();
+        let bytes = self.bytes_of(name, array);
+        let (rows, _) = bytes.as_chunks::<8>();
         rows.iter().map(|r| f64::from_le_bytes(*r)).collect()
     }
 
     /// The bytes of an array.
     pub fn bytes_of(&self, name: &str, array: &str) -> Vec<u8> {
-        let text = fs::read_to_string(self.file(name)).expect("text");
-        decode(&text[find(&text, array).data])[8..].to_vec()
+        let file = fs::read(self.file(name)).expect("a file");
+        let place = find(&file, array);
+        let data = &file[place.data];
+        let decoded = if place.raw { data } else { &decode(data) };
+        decoded[8..].to_vec()
     }
 
     pub fn summary(&self, change: impl FnOnce(&mut Value)) {
@@ -157,22 +180,40 @@ impl Copy {
     }
 }
 
-fn find(text: &str, array: &str) -> Place {
-    let name = text.find(&format!("Name=\"{array}\"")).expect("the array");
-    let tag = text[..name].rfind('<').expect("a tag");
-    let open = name + text[name..].find('>').expect("the end of the tag");
-    let end = open + text[open..].find('<').expect("the end of the array");
+fn position(bytes: &[u8], wanted: &[u8]) -> Option<usize> {
+    bytes.windows(wanted.len()).position(|w| w == wanted)
+}
+
+fn find(file: &[u8], array: &str) -> Place {
+    let name = position(file, format!("Name=\"{array}\"").as_bytes()).expect("the array");
+    let start = file[..name].iter().rposition(|&b| b == b'<');
+    let start = start.expect("a tag");
+    let open = name + position(&file[name..], b">").expect("the end of the tag");
+    let tag = std::str::from_utf8(&file[start..open]).expect("text");
+    let Some((_, offset)) = tag.split_once(" offset=\"") else {
+        let end = open + position(&file[open..], b"<").expect("the end of the array");
+        return Place {
+            tag: start..open,
+            data: open + 1..end,
+            raw: false,
+        };
+    };
+    let offset: usize = offset.trim_end_matches("\"/").parse().expect("a number");
+    let block = position(file, b"<AppendedData").expect("a block");
+    let begin = block + position(&file[block..], b"_").expect("its first byte") + 1 + offset;
+    let length: [u8; 8] = file[begin..begin + 8].try_into().expect("a length");
     Place {
-        tag: tag..open,
-        data: open + 1..end,
+        tag: start..open,
+        data: begin..begin + 8 + u64::from_le_bytes(length) as usize,
+        raw: true,
     }
 }
 
 const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-fn decode(text: &str) -> Vec<u8> {
+fn decode(text: &[u8]) -> Vec<u8> {
     let (mut bits, mut count, mut bytes) = (0u32, 0, Vec::new());
-    for digit in text.bytes().take_while(|&d| d != b'=') {
+    for &digit in text.iter().take_while(|&&d| d != b'=') {
         let value = DIGITS.iter().position(|&d| d == digit).expect("base64");
         bits = bits << 6 | value as u32;
         count += 6;

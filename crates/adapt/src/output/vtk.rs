@@ -1,6 +1,5 @@
-//! What the .vtu and the .vtp writer share: arrays as vtkio wants them, and a stream that mends what vtkio leaves open.
+//! The way to vtkio, which writes the .vtp: arrays as it wants them, and a stream that mends what it leaves open.
 
-use std::borrow::Cow;
 use std::io::{self, Write};
 
 use vtkio::IOBuffer;
@@ -59,14 +58,6 @@ impl Arrays {
         }
         self.list.push(Attribute::scalars(name, 1).with_data(data));
         Ok(())
-    }
-
-    /// Appends an array that may not have been computed.
-    pub(super) fn push_some(&mut self, name: &str, data: Option<Cow<'_, [f64]>>) -> io::Result<()> {
-        match data {
-            Some(data) => self.push(name, data.into_owned()),
-            None => Ok(()),
-        }
     }
 
     /// The list for vtkio.
@@ -208,11 +199,11 @@ impl<W: Write> Write for Splice<'_, W> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// Takes a few bytes, then the disk is full.
-    struct FullDisk(usize);
+    pub(in super::super) struct FullDisk(pub usize);
 
     impl Write for FullDisk {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
