@@ -22,7 +22,7 @@ pub struct Estimates {
     pub global_bound: Option<GlobalBound>,
     /// Residual estimator, if wanted.
     pub residual: Option<Squares>,
-    /// The certificate, if wanted.
+    /// The certificate, if wanted and made on this level.
     pub certificate: Option<Certificate>,
     /// Data oscillation; none for constant loads, which have no oscillation.
     pub oscillation: Option<Squares>,
@@ -41,8 +41,11 @@ pub struct Estimates {
     pub unseen: f64,
     /// The number that the run is judged by.
     pub bound: f64,
-    /// Whether the bound is predicted: with the estimated algebraic error in place of eta_alg, since that is large beside eta.
+    /// Whether the bound is predicted: by the cheap indicators, or with the estimated algebraic error in place of eta_alg, since that is
+    /// large beside eta.
     pub predicted: bool,
+    /// The cheap indicators of a run that the certificate drives: the residual estimator, and the oscillation over the root of the tension.
+    pub cheap: Option<f64>,
     /// What the bound would be without eta_alg: within reach of the solver on this mesh.
     pub reachable: f64,
     /// The size of the energy error as far as the estimators tell; the certificate's eta, or a fifth of the residual estimator.
@@ -57,10 +60,17 @@ impl Estimates {
         solution: &Solution,
         problem: &Problem,
         settings: &Settings,
+        forecast: Option<f64>,
     ) -> Result<Estimates, LevelError> {
+        let drives = settings.estimate.estimator == Estimator::Certified;
         let wants = |e| settings.estimate.wants(e);
         let paper = wants(Estimator::Paper).then(|| estimate::paper(mesh, discrete, solution));
-        let sweep = estimate::sweep(mesh, discrete, solution, wants(Estimator::Residual));
+        let sweep = estimate::sweep(
+            mesh,
+            discrete,
+            solution,
+            drives || wants(Estimator::Residual),
+        );
         let oscillation = sweep.oscillation;
         let global_bound = paper.as_ref().map(|paper| {
             let oscillation = oscillation.as_ref().map_or(0.0, Squares::total);
@@ -93,6 +103,10 @@ impl Estimates {
             None => None,
         };
         let residual = sweep.residual;
+        let cheap = residual.as_ref().filter(|_| drives).map(|residual| {
+            let unseen = sweep.weighted_oscillation.as_ref();
+            residual.total().hypot(unseen.map_or(0.0, Squares::total))
+        });
         let squares = |local: &[f64]| -> Vec<f64> { local.iter().map(|e| e * e).collect() };
         // The driving estimator was asked for, so it is there. The certificate sees all of the loads.
         let (mut marking, unseen) = match settings.estimate.estimator {
@@ -104,23 +118,25 @@ impl Estimates {
                 residual.as_ref().map_or(Vec::new(), |r| r.squares().into()),
                 sweep.weighted_oscillation.as_ref(),
             ),
-            Estimator::Certified => (
-                certificate
-                    .as_ref()
-                    .map_or(Vec::new(), |c| squares(&c.local)),
-                None,
-            ),
+            Estimator::Certified => match &certificate {
+                Some(certificate) => (squares(&certificate.local), None),
+                None => (
+                    residual.as_ref().map_or(Vec::new(), |r| r.squares().into()),
+                    sweep.weighted_oscillation.as_ref(),
+                ),
+            },
         };
         if let Some(unseen) = unseen {
             for (square, unseen) in marking.iter_mut().zip(unseen.squares()) {
                 *square += unseen;
             }
         }
-        let unseen = unseen.map_or(0.0, Squares::total);
+        let unseen = unseen.filter(|_| !drives).map_or(0.0, Squares::total);
+        let predicted = forecast.zip(cheap).map_or(0.0, |(q, cheap)| q * cheap);
         let bound = match settings.estimate.estimator {
             Estimator::Paper => marking.iter().sum::<f64>().sqrt(),
             Estimator::Residual => residual.as_ref().map_or(0.0, Squares::total),
-            Estimator::Certified => certificate.as_ref().map_or(0.0, |c| c.bound),
+            Estimator::Certified => certificate.as_ref().map_or(predicted, |c| c.bound),
         };
         let largest_contribution = match settings.estimate.estimator {
             Estimator::Paper => sweep.largest_contribution,
@@ -129,7 +145,7 @@ impl Estimates {
         let mut estimates = Estimates {
             paper,
             global_bound,
-            residual,
+            residual: residual.filter(|_| wants(Estimator::Residual)),
             certificate,
             oscillation,
             errors,
@@ -140,10 +156,10 @@ impl Estimates {
             energy: sweep.energy,
             bound,
             predicted: false,
+            cheap,
             reachable: bound,
             error_size: None,
         };
-        let drives = settings.estimate.estimator == Estimator::Certified;
         estimates.judge(drives, solution.info.algebraic_error);
         Ok(estimates)
     }
@@ -175,6 +191,14 @@ impl Estimates {
         Ok(ratio)
     }
 
+    /// What the bound, without its algebraic part, is of the cheap indicators on a level that has both.
+    pub(crate) fn quotient(&self) -> Option<f64> {
+        let bound = self.certificate.as_ref()?.predicted(0.0);
+        self.cheap
+            .map(|cheap| bound / cheap)
+            .filter(|quotient| quotient.is_finite() && *quotient > 0.0)
+    }
+
     /// The bound as it is guaranteed, whatever eta_alg is; for a level that may be the last.
     pub(crate) fn guarantee(&mut self, drives: bool) {
         self.judge(drives, None);
@@ -196,6 +220,9 @@ impl Estimates {
                     None => certificate.bound,
                 };
             }
+        } else if drives {
+            self.predicted = true;
+            self.error_size = Some(self.bound);
         } else if let Some(residual) = &self.residual {
             self.error_size = Some(RESIDUAL_SHARE * residual.total());
         }

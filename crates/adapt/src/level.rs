@@ -26,8 +26,10 @@ pub struct Level {
     pub mesh: Arc<Mesh>,
     /// Matrices and loads.
     pub discrete: DiscreteProblem,
-    /// Moments of the data, where the certificate is wanted.
+    /// Moments of the data, where there is a certificate.
     pub moments: Option<Moments>,
+    /// The quotient that stands in for a certificate that was left out.
+    forecast: Option<f64>,
     /// Displacements, action, Riesz representative, contact set.
     pub solution: Solution,
     /// Indicators and errors.
@@ -43,8 +45,53 @@ pub const BALANCE: f64 = 0.1;
 /// smaller costs an iterative solver one step.
 pub const SETTLED: f64 = 0.01;
 
+/// From so many vertices on a run that the certificate drives goes by cheap indicators as long as its goal is far. Below, the certificate
+/// of all levels together takes a few milliseconds.
+const CHEAP_FROM: usize = 10_000;
+
+/// The quotient of the certificate and the cheap indicators is taken anew when the number of vertices has grown by this factor: all these
+/// certificates together cost an eighth of the last one.
+const RENEWED: usize = 8;
+
+/// What is known of the certificate before it is made.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Forecast {
+    /// Quotient of the bound and the cheap indicators where both were there last.
+    quotient: Option<f64>,
+    /// Vertices of that level.
+    vertices: usize,
+}
+
+impl Forecast {
+    /// Takes in a finished level.
+    pub fn see(&mut self, level: &Level) {
+        if let Some(quotient) = level.estimates.quotient() {
+            self.quotient = Some(quotient);
+            self.vertices = level.mesh.vertex_count();
+        }
+    }
+
+    /// The quotient that a level is to be judged by instead of its certificate, if it is to be.
+    fn on(self, mesh: &Mesh) -> Option<f64> {
+        let vertices = mesh.vertex_count();
+        self.quotient
+            .filter(|_| vertices >= CHEAP_FROM && vertices < RENEWED * self.vertices)
+    }
+}
+
 /// How often a level is solved to a higher accuracy before its balance is given up.
 const ROUNDS: usize = 8;
+
+/// What a level is begun with.
+#[derive(Default)]
+struct Begin {
+    number: usize,
+    start: Option<Start>,
+    /// The error to be expected.
+    expected: Option<f64>,
+    forecast: Option<f64>,
+    seconds_refine: f64,
+}
 
 /// What a run knows everywhere.
 #[derive(Clone, Copy)]
@@ -62,7 +109,7 @@ impl Level {
     ) -> Result<Level, LevelError> {
         let mesh = Arc::new(context.problem.mesh.clone());
         let discrete = |mesh: &Arc<Mesh>| discretise(context.problem, mesh);
-        Level::on(mesh, context, discrete, None, 0, 0.0, workspace)
+        Level::on(mesh, context, discrete, Begin::default(), workspace)
     }
 
     /// Refines the marked triangles, carries the solution over, solves and estimates.
@@ -70,6 +117,7 @@ impl Level {
         &self,
         marked: &[TriangleId],
         context: Context<'_>,
+        forecast: Forecast,
         workspace: &mut Workspace,
     ) -> Result<Level, LevelError> {
         let settings = context.settings;
@@ -83,34 +131,41 @@ impl Level {
         // First-order elements: the error goes like the root of the number of vertices at best.
         let growth = self.mesh.vertex_count() as f64 / mesh.vertex_count() as f64;
         let expected = self.estimates.error_size.map(|size| size * growth.sqrt());
-        let seconds = clock.elapsed().as_secs_f64();
-        let start = Some((carried, expected));
-        let before = Before {
-            discrete: &self.discrete,
-            parent: &refinement.parent,
+        let begin = Begin {
+            number: self.number + 1,
+            start: Some(carried),
+            expected,
+            forecast: forecast.on(&mesh),
+            seconds_refine: clock.elapsed().as_secs_f64(),
         };
-        let discrete = |mesh: &Arc<Mesh>| discretise_carried(context.problem, mesh, before);
-        let number = self.number + 1;
-        let mesh = Arc::new(mesh);
-        Level::on(mesh, context, discrete, start, number, seconds, workspace)
+        let discrete = |mesh: &Arc<Mesh>| {
+            if self.moments.is_some() {
+                // Loads that came from the moments of a certificate are not carried over.
+                return discretise(context.problem, mesh);
+            }
+            let before = Before {
+                discrete: &self.discrete,
+                parent: &refinement.parent,
+            };
+            discretise_carried(context.problem, mesh, before)
+        };
+        Level::on(Arc::new(mesh), context, discrete, begin, workspace)
     }
 
-    /// Solves and estimates on a mesh; `discrete` finds the discrete problem where the certificate is not wanted, `before` is the solution carried over
-    /// from the level before and the error to be expected.
+    /// Solves and estimates on a mesh; `discrete` finds the discrete problem where there will be no certificate.
     fn on(
         mesh: Arc<Mesh>,
         context: Context<'_>,
         discrete: impl FnOnce(&Arc<Mesh>) -> Result<DiscreteProblem, DataError>,
-        before: Option<(Start, Option<f64>)>,
-        number: usize,
-        seconds_refine: f64,
+        begin: Begin,
         workspace: &mut Workspace,
     ) -> Result<Level, LevelError> {
         let Context {
             problem, settings, ..
         } = context;
         let clock = Instant::now();
-        let (discrete, moments) = if settings.estimate.wants(Estimator::Certified) {
+        let certified = settings.estimate.wants(Estimator::Certified) && begin.forecast.is_none();
+        let (discrete, moments) = if certified {
             let (discrete, moments) = discretise_with_moments(problem, &mesh)?;
             (discrete, Some(moments))
         } else {
@@ -118,16 +173,13 @@ impl Level {
         };
         let seconds_assemble = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let (start, expected) = match before {
-            Some((start, expected)) => (Some(start), expected),
-            None => (None, None),
-        };
         let solve = contact::Settings {
-            energy_target: expected.map(|size| BALANCE * size),
+            energy_target: begin.expected.map(|size| BALANCE * size),
             sigma: needs_sigma(problem, settings),
             ..settings.solve
         };
-        let solution = contact::solve_in(&discrete, &solve, start.as_ref(), workspace)?;
+        let solution = contact::solve_in(&discrete, &solve, begin.start.as_ref(), workspace)?;
+        drop(begin.start);
         let seconds_solve = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let estimates = Estimates::of(
@@ -137,19 +189,21 @@ impl Level {
             &solution,
             problem,
             settings,
+            begin.forecast,
         )?;
         let mut record =
             LevelRecord::of(&mesh, &discrete, &solution, &estimates, problem, settings)?;
-        record.level = number;
-        record.seconds_refine = seconds_refine;
+        record.level = begin.number;
+        record.seconds_refine = begin.seconds_refine;
         record.seconds_assemble = seconds_assemble;
         record.seconds_solve = seconds_solve;
         record.seconds_estimate = clock.elapsed().as_secs_f64();
         let mut level = Level {
-            number,
+            number: begin.number,
             mesh,
             discrete,
             moments,
+            forecast: begin.forecast,
             solution,
             estimates,
             record,
@@ -202,10 +256,58 @@ impl Level {
                 &self.solution,
                 problem,
                 settings,
+                self.forecast,
             )?;
             self.renew(context)?;
             self.record.seconds_estimate += clock.elapsed().as_secs_f64();
         }
+        Ok(())
+    }
+
+    /// Makes the certificate that was left out, for a level that may be the last or whose goal is near.
+    ///
+    /// The loads become those of its moments, and the solution follows them.
+    pub(crate) fn certify(
+        &mut self,
+        context: Context<'_>,
+        workspace: &mut Workspace,
+    ) -> Result<(), LevelError> {
+        let Context {
+            problem, settings, ..
+        } = context;
+        let clock = Instant::now();
+        let (discrete, moments) = discretise_with_moments(problem, &self.mesh)?;
+        self.record.seconds_assemble += clock.elapsed().as_secs_f64();
+        let constant = problem.load.iter().all(|load| load.constant().is_some());
+        self.discrete.loads = discrete.loads;
+        self.moments = Some(moments);
+        self.forecast = None;
+        if !constant {
+            let clock = Instant::now();
+            let solve = contact::Settings {
+                energy_target: self.estimates.error_size.map(|size| BALANCE * size),
+                sigma: needs_sigma(problem, settings),
+                ..settings.solve
+            };
+            let start = Start::again(&self.solution);
+            let mut better = contact::solve_in(&self.discrete, &solve, Some(&start), workspace)?;
+            better.info.iterations += self.solution.info.iterations;
+            self.solution = better;
+            self.record.seconds_solve += clock.elapsed().as_secs_f64();
+        }
+        let clock = Instant::now();
+        self.estimates = Estimates::of(
+            &self.mesh,
+            &self.discrete,
+            self.moments.as_ref(),
+            &self.solution,
+            problem,
+            settings,
+            None,
+        )?;
+        self.renew(context)?;
+        self.record.seconds_estimate += clock.elapsed().as_secs_f64();
+        self.stamp(context);
         Ok(())
     }
 

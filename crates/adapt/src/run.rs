@@ -8,7 +8,7 @@ use fem_core::{FieldError, MeshError, Scale};
 
 use crate::discretise::DataError;
 use crate::estimates::bound_unit;
-use crate::level::{Context, Level};
+use crate::level::{Context, Forecast, Level};
 use crate::mark::mark;
 use crate::output::OutputError;
 use crate::problem::Problem;
@@ -36,10 +36,12 @@ pub fn run(
     let failed = |level: usize| move |cause: LevelError| RunError { level, cause };
     let mut level = Level::initial(context, &mut workspace).map_err(failed(0))?; // SOLVE, ESTIMATE
     let mut sharpness = SHARPNESS;
+    let mut forecast = Forecast::default();
     loop {
         let number = level.number;
         let reason =
             finish(&mut level, context, &mut workspace, &mut sharpness).map_err(failed(number))?;
+        forecast.see(&level);
         if settings.output.wants_fields(number, reason.is_some()) {
             level
                 .complete(context, &mut workspace)
@@ -52,7 +54,7 @@ pub fn run(
             return Ok(Outcome { reason, level });
         }
         let marked = mark(&level.estimates.marking, &settings.mark); // MARK
-        level = match level.refine(&marked, context, &mut workspace) {
+        level = match level.refine(&marked, context, forecast, &mut workspace) {
             // REFINE, SOLVE, ESTIMATE
             Ok(next) => next,
             Err(cause) => {
@@ -85,6 +87,12 @@ fn finish(
     let drives = settings.estimate.estimator == Estimator::Certified;
     let sharp = settings.estimate.last == Final::Sharp;
     let factor = if drives && sharp { *sharpness } else { 1.0 };
+    if level.estimates.certificate.is_none() {
+        if reason(level, NEAR * factor * level.estimates.reachable).is_none() {
+            return Ok(None);
+        }
+        level.certify(context, workspace)?;
+    }
     if reason(level, factor * level.estimates.reachable).is_none() {
         return Ok(None);
     }
@@ -203,6 +211,9 @@ const ROUNDING_SHARE: f64 = 1e-12;
 
 /// Quotient of the sharp certificate and the fast one that is expected before one has been seen: the largest measured.
 const SHARPNESS: f64 = 0.9;
+
+/// A predicted bound times this is taken to be the least that the certificate may come out as.
+const NEAR: f64 = 0.9;
 
 /// The first rule that would hold on a level with this bound.
 fn reached(settings: &Settings, level: &Level, scale: Scale, bound: f64) -> Option<Reason> {

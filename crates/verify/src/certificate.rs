@@ -9,7 +9,7 @@ use adapt::output::folder::SUMMARY;
 use adapt::settings::{Estimator, Final};
 use adapt::{Assurance, Problem, Settings};
 use estimate::certificate::POINCARE;
-use estimate::{Given, Grade, Moments, certify};
+use estimate::{Given, Grade, certify};
 use fem_core::FieldError;
 use fem_core::scale::times_power_of_two;
 use serde_json::{Map, Value};
@@ -63,8 +63,25 @@ pub(crate) struct Place<'a> {
     pub last: bool,
     /// The kind of bound that the history claims.
     pub claimed: Option<&'a str>,
+    /// Whether the history claims a certificate.
+    pub certified: bool,
+    /// The bound that the history claims, in the user's units.
+    pub bound: Option<f64>,
     /// The estimate of the algebraic error that the history claims, in the user's units.
     pub algebraic: Option<f64>,
+}
+
+impl Place<'_> {
+    /// Whether there must be a certificate here.
+    pub fn has(&self, settings: &Settings) -> bool {
+        settings.estimate.wants(Estimator::Certified) && !self.left_out(settings)
+    }
+
+    /// Whether the certificate may be left out here and was: a level that the run went on from, judged by cheap indicators.
+    pub fn left_out(&self, settings: &Settings) -> bool {
+        let drives = settings.estimate.estimator == Estimator::Certified;
+        drives && !self.last && !self.certified && self.claimed == Some("predicted")
+    }
 }
 
 /// The grade that the certificate of a level must have: on the last level the one that the scene asks for; on an earlier one the sharp one stands
@@ -91,17 +108,16 @@ pub(crate) fn certificate(
     settings: &Settings,
     place: Place<'_>,
 ) -> Result<Option<Certificate>, FieldError> {
-    if !settings.estimate.wants(Estimator::Certified) {
+    let Some(moments) = &level.moments else {
         return Ok(None);
-    }
+    };
     let load = [&*problem.load[0], &*problem.load[1]];
     let tension = [&*problem.tension[0], &*problem.tension[1]];
-    let moments = Moments::relative_to(&level.reference, level.mesh, load, tension)?;
     let given = Given {
         mesh: level.mesh,
         load,
         tension,
-        moments: &moments,
+        moments,
         tension_mean: &level.tension,
         displacement: &level.displacement,
         force: &level.force,

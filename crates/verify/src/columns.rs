@@ -3,6 +3,7 @@
 use adapt::settings::Estimator;
 use adapt::{Problem, Settings};
 use estimate::{ContactSet, TrueErrors, contact_set};
+use fem_core::scale::times_power_of_two;
 use fem_core::{FieldError, Scale};
 
 use crate::certificate::{Certificate, Place, certificate};
@@ -33,6 +34,9 @@ pub(crate) struct Recomputed<'a> {
     pub contact_set: Option<ContactSet>,
     /// The certificate, if the scene asks for it.
     pub certificate: Option<Certificate>,
+    /// The bound that is claimed on a level without a certificate, in a run that the certificate drives: a prediction, which proves nothing and
+    /// is not recomputed.
+    pub predicted: Option<f64>,
     /// Oscillation of the loads.
     pub oscillation: Local,
     /// J(u_h).
@@ -80,6 +84,7 @@ impl<'a> Recomputed<'a> {
                 .map(|p| global_bound(discrete, p, &oscillation)),
             paper,
             residual: wants(Estimator::Residual).then(|| residual(discrete)),
+            predicted: place.bound.filter(|_| place.left_out(settings)),
             certificate: certificate(discrete, problem, settings, place)?,
             contact_set,
             oscillation,
@@ -104,7 +109,14 @@ impl<'a> Recomputed<'a> {
     /// The number that the run is judged by.
     pub fn bound(&self) -> Option<Number> {
         match self.settings.estimate.estimator {
-            Estimator::Certified => Some(self.certificate.as_ref()?.judged()),
+            Estimator::Certified => match &self.certificate {
+                Some(certificate) => Some(certificate.judged()),
+                None => {
+                    let exponent = self.scale.energy_norm();
+                    let scaled = |bound| times_power_of_two(bound, -exponent);
+                    self.predicted.map(|b| Number::plain(scaled(b), exponent))
+                }
+            },
             Estimator::Residual => {
                 let local = self.residual.as_ref()?;
                 Some(local.root(self.scale.energy_norm()))
@@ -252,7 +264,10 @@ pub(crate) const COLUMNS: &[Column] = &[
     ("peak_memory_mb", |_| Entry::Covered),
     ("bound_kind", |r| {
         Entry::Name(match r.settings.estimate.estimator {
-            Estimator::Certified => r.certificate.as_ref().map_or("rt0", Certificate::kind),
+            Estimator::Certified => r
+                .certificate
+                .as_ref()
+                .map_or("predicted", Certificate::kind),
             Estimator::Residual => "residual",
             Estimator::Paper => "paper",
         })

@@ -1,6 +1,7 @@
 //! The scene's data on the mesh of a level, and the discrete solution of its file, all scaled.
 
 use adapt::Problem;
+use estimate::Moments;
 use fem_core::integrate::{Loads, Reference, load_pair_relative_to, means};
 use fem_core::scale::times_power_of_two;
 use fem_core::{ElementValues, Field, FieldError, Mesh, Samples, Scale};
@@ -13,8 +14,8 @@ pub(crate) struct Discrete<'a> {
     pub mesh: &'a Mesh,
     /// The units.
     pub scale: Scale,
-    /// What the loads of elements are judged by.
-    pub reference: Reference,
+    /// Moments of the data, on a level with a certificate; the loads are theirs there, so that they cancel in it.
+    pub moments: Option<Moments>,
     /// Its triangles.
     pub elements: Vec<Element>,
     /// Element means of the tensions.
@@ -48,11 +49,16 @@ pub(crate) struct Nodal {
 }
 
 impl<'a> Discrete<'a> {
-    /// Integrates the data of the scene over the mesh of a file.
+    /// Integrates the data of the scene over the mesh of a file, on a level with a certificate or without.
     ///
     /// # Errors
     /// A value of the data that is not finite.
-    pub fn new(mesh: &'a Mesh, problem: &Problem, nodal: Nodal) -> Result<Self, FieldError> {
+    pub fn new(
+        mesh: &'a Mesh,
+        problem: &Problem,
+        nodal: Nodal,
+        certified: bool,
+    ) -> Result<Self, FieldError> {
         let elements = elements(mesh);
         let mut dual_area = vec![0.0; mesh.vertex_count()];
         for e in &elements {
@@ -63,19 +69,27 @@ impl<'a> Discrete<'a> {
         // The run judged its elements by the loads on the initial mesh.
         let load = [&*problem.load[0], &*problem.load[1]];
         let reference = Reference::of(&problem.mesh, load)?;
+        let tension = [&*problem.tension[0], &*problem.tension[1]];
+        let moments = certified
+            .then(|| Moments::relative_to(&reference, mesh, load, tension))
+            .transpose()?;
+        let loads = match &moments {
+            Some(moments) => moments.loads(mesh),
+            None => load_pair_relative_to(&reference, mesh, load)?,
+        };
         let pair = |fields: &[std::sync::Arc<dyn Field>; 2]| {
             Ok::<_, FieldError>([means(mesh, &*fields[0])?, means(mesh, &*fields[1])?])
         };
         Ok(Discrete {
             tension: pair(&problem.tension)?,
-            loads: load_pair_relative_to(&reference, mesh, load)?,
+            loads,
             heights: [
                 heights(mesh, &*problem.height[0])?,
                 heights(mesh, &*problem.height[1])?,
             ],
             mesh,
             scale: problem.scale,
-            reference,
+            moments,
             elements,
             dual_area,
             displacement: nodal.displacement,

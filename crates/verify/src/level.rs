@@ -6,6 +6,7 @@ use fem_core::scale::times_power_of_two;
 use fem_core::{FieldError, Mesh};
 use scene::Scene;
 
+use crate::certificate::Place;
 use crate::columns::Recomputed;
 use crate::conditions;
 use crate::cover;
@@ -116,7 +117,11 @@ impl LevelFile {
     ///
     /// # Errors
     /// A value of the data that is not finite.
-    pub fn discrete<'a>(&'a self, scene: &'a Scene) -> Result<Discrete<'a>, FieldError> {
+    pub fn discrete<'a>(
+        &'a self,
+        scene: &'a Scene,
+        place: Place<'_>,
+    ) -> Result<Discrete<'a>, FieldError> {
         let problem = &scene.problem;
         let scaled = |values: &[f64], exponent: i32| -> Vec<f64> {
             let by = |&v: &f64| times_power_of_two(v, -exponent);
@@ -131,7 +136,7 @@ impl LevelFile {
             sigma: scaled(&fields.sigma, force),
             contact: fields.contact.iter().map(|&c| c != 0).collect(),
         };
-        Discrete::new(&self.mesh, problem, nodal)
+        Discrete::new(&self.mesh, problem, nodal, place.has(&scene.settings))
     }
 
     /// Compares mesh and arrays of the file.

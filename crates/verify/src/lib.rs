@@ -90,14 +90,16 @@ pub fn verify(path: &Path) -> Result<Report, VerifyError> {
             // The level that a failed run kept was not meant to be its last.
             last: last && code != 3,
             claimed: history.text(number, "bound_kind"),
+            certified: history.number(number, "certified").is_some(),
             algebraic: history.number(number, "algebraic_error"),
+            bound: history.number(number, "error_bound"),
         };
         let file = match with_fields.binary_search(&number) {
             Ok(_) => level::read(&folder, number, &scene, &mut report)?,
             Err(_) => None,
         };
         let discrete = match &file {
-            Some(file) => file.discrete(&scene).map(Some),
+            Some(file) => file.discrete(&scene, place).map(Some),
             None => Ok(None),
         };
         let level = discrete

@@ -52,7 +52,7 @@ pub(crate) fn level<'a>(
         sigma,
         contact,
     };
-    Discrete::new(mesh, &problem(mesh), nodal).unwrap()
+    Discrete::new(mesh, &problem(mesh), nodal, false).unwrap()
 }
 
 /// Numbers between -1 and 1.
