@@ -12,7 +12,7 @@
 use crate::error::MeshError;
 use crate::index::{TriangleId, VertexId};
 use crate::mesh::{Mesh, TRIANGLE_LIMIT, signed_area};
-use crate::parts::{FACES, Link, PARTS, REFINEMENT_EDGE};
+use crate::parts::{FACES, Link, PARTS, REFINEMENT_EDGE, TOUCHING};
 use crate::topology::{Birth, Neighbour, Topology};
 
 /// How far a marked triangle is divided.
@@ -150,7 +150,7 @@ impl Entry {
 
     /// The vertex born on an owned edge; [`FACES`] gives the order.
     fn born(self, face: usize) -> VertexId {
-        VertexId(self.vertex + (self.owned as u32 >> (face + 1)).count_ones())
+        VertexId(self.vertex + ones(self.owned >> (face + 1)))
     }
 }
 
@@ -172,7 +172,7 @@ struct Vertices {
 impl<'a> Plan<'a> {
     fn new(old: &'a Topology, split: &[u8]) -> Result<Self, MeshError> {
         let count = old.triangle_count();
-        let triangles = count + split.iter().map(|b| b.count_ones() as usize).sum::<usize>();
+        let triangles = count + split.iter().map(|&b| ones(b) as usize).sum::<usize>();
         if triangles > TRIANGLE_LIMIT {
             return Err(MeshError::TooLarge {
                 triangles,
@@ -198,8 +198,8 @@ impl<'a> Plan<'a> {
                 key: split | ((generation & 1) as u8) << 3,
                 owned,
             });
-            child += 1 + split.count_ones();
-            vertex += owned.count_ones();
+            child += 1 + ones(split);
+            vertex += ones(owned);
         }
         Ok(Plan {
             old,
@@ -240,7 +240,7 @@ impl<'a> Plan<'a> {
         };
         let entry = self.entries[n.index()];
         // The edge runs the other way round there.
-        let [end, start] = PARTS[(entry.key & 15) as usize].touching[face];
+        let [end, start] = TOUCHING[((entry.key & 15) << 2) as usize | face & 3];
         let at = |place| Neighbour::at(TriangleId(entry.child), place as u32);
         ([at(start), at(end)], entry.born(face))
     }
@@ -312,6 +312,18 @@ impl<'a> Plan<'a> {
             let corners = self.old.triangles[t];
             let around = self.old.neighbours[t];
             let old_generation = self.old.generation[t];
+            if entry.key & 7 == 0 {
+                let mut kept = [Neighbour::BOUNDARY; 3];
+                for face in 0..3 {
+                    kept[face] = self.behind(around[face]).0[0];
+                }
+                triangles.push(corners);
+                neighbours.push(kept);
+                generation.push(old_generation);
+                region.push(mesh.region[t]);
+                parent.push(TriangleId(t as u32));
+                continue;
+            }
             let mut vertex = [corners[0]; 8];
             vertex[..3].copy_from_slice(&corners);
             let mut outer = [Neighbour::BOUNDARY; 8];
@@ -323,14 +335,6 @@ impl<'a> Plan<'a> {
                     let mine = entry.owns(face);
                     vertex[3 + face] = if mine { entry.born(face) } else { theirs };
                 }
-            }
-            if entry.key & 7 == 0 {
-                triangles.push(corners);
-                neighbours.push([outer[0], outer[2], outer[4]]);
-                generation.push(old_generation);
-                region.push(mesh.region[t]);
-                parent.push(TriangleId(t as u32));
-                continue;
             }
             let parts = &PARTS[(entry.key & 15) as usize];
             for part in 0..parts.count as usize & 7 {
@@ -383,6 +387,12 @@ impl<'a> Plan<'a> {
         };
         Ok((refined, parent))
     }
+}
+
+/// Number of ones among three bits; not every processor that this is compiled for counts them in one step.
+#[inline(always)]
+fn ones(bits: u8) -> u32 {
+    0b11_10_10_01_10_01_01_00 >> (2 * bits) & 3
 }
 
 /// A copy with room for `count` entries.
