@@ -308,22 +308,33 @@ impl<'a> Plan<'a> {
         let mut generation = Vec::with_capacity(self.triangles);
         let mut region = Vec::with_capacity(self.triangles);
         let mut parent = Vec::with_capacity(self.triangles);
-        for (t, &entry) in self.entries.iter().enumerate() {
+        let mut next = 0;
+        while next < self.entries.len() {
+            // Triangles that stay, up to the next that is split.
+            let stay = self.entries[next..].iter().position(|e| e.key & 7 != 0);
+            let run = next..stay.map_or(self.entries.len(), |n| next + n);
+            if !run.is_empty() {
+                next = run.end;
+                triangles.extend_from_slice(&self.old.triangles[run.clone()]);
+                generation.extend_from_slice(&self.old.generation[run.clone()]);
+                region.extend_from_slice(&mesh.region[run.clone()]);
+                parent.extend(run.clone().map(|t| TriangleId(t as u32)));
+                neighbours.extend(self.old.neighbours[run].iter().map(|around| {
+                    let [a, b, c] = *around;
+                    [
+                        self.behind(a).0[0],
+                        self.behind(b).0[0],
+                        self.behind(c).0[0],
+                    ]
+                }));
+                continue;
+            }
+            let t = next;
+            next += 1;
+            let entry = self.entries[t];
             let corners = self.old.triangles[t];
             let around = self.old.neighbours[t];
             let old_generation = self.old.generation[t];
-            if entry.key & 7 == 0 {
-                let mut kept = [Neighbour::BOUNDARY; 3];
-                for face in 0..3 {
-                    kept[face] = self.behind(around[face]).0[0];
-                }
-                triangles.push(corners);
-                neighbours.push(kept);
-                generation.push(old_generation);
-                region.push(mesh.region[t]);
-                parent.push(TriangleId(t as u32));
-                continue;
-            }
             let mut vertex = [corners[0]; 8];
             vertex[..3].copy_from_slice(&corners);
             let mut outer = [Neighbour::BOUNDARY; 8];
