@@ -2,7 +2,7 @@
 //!
 //! A triangle (v0, v1, v2) is bisected at the midpoint p of its refinement edge (v0, v1) into (v2, v0, p) and (v1, v2, p), whose newest
 //! vertex is p; both stay counter-clockwise. A pass marks edges instead of recursing: if any edge of a triangle is split, its
-//! refinement edge is too. Every triangle then has one to four children, known from three bits ([`crate::parts`]), and takes the
+//! refinement edge is too. Every triangle then has one to four children, known from three bits (module `parts`), and takes the
 //! place of its parent in the order, so that the leaves always lie along a space-filling curve: it enters an
 //! even triangle at v0 and leaves at v1, an odd one the other way round.
 //!
@@ -88,7 +88,7 @@ impl Mesh {
     /// The split bits of every triangle, and the number of edges looked at.
     fn closure(&self, marked: &[TriangleId], children: Children) -> (Vec<u8>, usize) {
         let mut split = vec![0u8; self.triangle_count()];
-        let mut stack: Vec<(TriangleId, usize)> = Vec::new();
+        let mut stack: Vec<Neighbour> = Vec::new();
         let mut steps = 0;
         let faces: &[usize] = match children {
             Children::Two => &FACES[..1],
@@ -96,19 +96,25 @@ impl Mesh {
         };
         for &t in marked {
             for &face in faces {
-                stack.push((t, face));
-                while let Some((t, face)) = stack.pop() {
-                    steps += 1;
+                steps += 1;
+                stack.push(Neighbour::new(t, face));
+                while let Some((t, face)) = stack.pop().and_then(Neighbour::get) {
                     let bits = &mut split[t.index()];
                     if *bits & 1 << face != 0 {
                         continue;
                     }
                     *bits |= 1 << face;
-                    if face != REFINEMENT_EDGE && *bits & 1 << REFINEMENT_EDGE == 0 {
-                        stack.push((t, REFINEMENT_EDGE));
+                    if *bits & 1 << REFINEMENT_EDGE == 0 {
+                        steps += 1;
+                        stack.push(Neighbour::new(t, REFINEMENT_EDGE));
                     }
-                    if let Some(across) = self.topology.neighbours[t.index()][face].get() {
-                        stack.push(across);
+                    let across = self.topology.neighbours[t.index()][face];
+                    if let Some((n, g)) = across.get() {
+                        steps += 1;
+                        // What is split already needs no second look.
+                        if split[n.index()] & 1 << g == 0 {
+                            stack.push(across);
+                        }
                     }
                 }
             }
