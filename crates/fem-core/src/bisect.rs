@@ -2,7 +2,7 @@
 //!
 //! A triangle (v0, v1, v2) is bisected at the midpoint p of its refinement edge (v0, v1) into (v2, v0, p) and (v1, v2, p), whose newest
 //! vertex is p; both stay counter-clockwise. A pass marks edges instead of recursing: if any edge of a triangle is split, its
-//! refinement edge is too. Every triangle then has one to four children, known from three bits ([`crate::parts`]), and takes the
+//! refinement edge is too. Every triangle then has one to four children, known from three bits (module `parts`), and takes the
 //! place of its parent in the order, so that the leaves always lie along a space-filling curve: it enters an
 //! even triangle at v0 and leaves at v1, an odd one the other way round.
 //!
@@ -12,7 +12,7 @@
 use crate::error::MeshError;
 use crate::index::{TriangleId, VertexId};
 use crate::mesh::{Mesh, TRIANGLE_LIMIT, signed_area};
-use crate::parts::{FACES, Link, PARTS, REFINEMENT_EDGE};
+use crate::parts::{FACES, Link, PARTS, REFINEMENT_EDGE, TOUCHING};
 use crate::topology::{Birth, Neighbour, Topology};
 
 /// How far a marked triangle is divided.
@@ -88,7 +88,7 @@ impl Mesh {
     /// The split bits of every triangle, and the number of edges looked at.
     fn closure(&self, marked: &[TriangleId], children: Children) -> (Vec<u8>, usize) {
         let mut split = vec![0u8; self.triangle_count()];
-        let mut stack: Vec<(TriangleId, usize)> = Vec::new();
+        let mut stack: Vec<Neighbour> = Vec::new();
         let mut steps = 0;
         let faces: &[usize] = match children {
             Children::Two => &FACES[..1],
@@ -96,19 +96,25 @@ impl Mesh {
         };
         for &t in marked {
             for &face in faces {
-                stack.push((t, face));
-                while let Some((t, face)) = stack.pop() {
-                    steps += 1;
+                steps += 1;
+                stack.push(Neighbour::new(t, face));
+                while let Some((t, face)) = stack.pop().and_then(Neighbour::get) {
                     let bits = &mut split[t.index()];
                     if *bits & 1 << face != 0 {
                         continue;
                     }
                     *bits |= 1 << face;
-                    if face != REFINEMENT_EDGE && *bits & 1 << REFINEMENT_EDGE == 0 {
-                        stack.push((t, REFINEMENT_EDGE));
+                    if *bits & 1 << REFINEMENT_EDGE == 0 {
+                        steps += 1;
+                        stack.push(Neighbour::new(t, REFINEMENT_EDGE));
                     }
-                    if let Some(across) = self.topology.neighbours[t.index()][face].get() {
-                        stack.push(across);
+                    let across = self.topology.neighbours[t.index()][face];
+                    if let Some((n, g)) = across.get() {
+                        steps += 1;
+                        // What is split already needs no second look.
+                        if split[n.index()] & 1 << g == 0 {
+                            stack.push(across);
+                        }
                     }
                 }
             }
@@ -150,7 +156,7 @@ impl Entry {
 
     /// The vertex born on an owned edge; [`FACES`] gives the order.
     fn born(self, face: usize) -> VertexId {
-        VertexId(self.vertex + (self.owned as u32 >> (face + 1)).count_ones())
+        VertexId(self.vertex + ones(self.owned >> (face + 1)))
     }
 }
 
@@ -172,7 +178,7 @@ struct Vertices {
 impl<'a> Plan<'a> {
     fn new(old: &'a Topology, split: &[u8]) -> Result<Self, MeshError> {
         let count = old.triangle_count();
-        let triangles = count + split.iter().map(|b| b.count_ones() as usize).sum::<usize>();
+        let triangles = count + split.iter().map(|&b| ones(b) as usize).sum::<usize>();
         if triangles > TRIANGLE_LIMIT {
             return Err(MeshError::TooLarge {
                 triangles,
@@ -198,8 +204,8 @@ impl<'a> Plan<'a> {
                 key: split | ((generation & 1) as u8) << 3,
                 owned,
             });
-            child += 1 + split.count_ones();
-            vertex += owned.count_ones();
+            child += 1 + ones(split);
+            vertex += ones(owned);
         }
         Ok(Plan {
             old,
@@ -240,7 +246,7 @@ impl<'a> Plan<'a> {
         };
         let entry = self.entries[n.index()];
         // The edge runs the other way round there.
-        let [end, start] = PARTS[(entry.key & 15) as usize].touching[face];
+        let [end, start] = TOUCHING[((entry.key & 15) << 2) as usize | face & 3];
         let at = |place| Neighbour::at(TriangleId(entry.child), place as u32);
         ([at(start), at(end)], entry.born(face))
     }
@@ -308,7 +314,30 @@ impl<'a> Plan<'a> {
         let mut generation = Vec::with_capacity(self.triangles);
         let mut region = Vec::with_capacity(self.triangles);
         let mut parent = Vec::with_capacity(self.triangles);
-        for (t, &entry) in self.entries.iter().enumerate() {
+        let mut next = 0;
+        while next < self.entries.len() {
+            // Triangles that stay, up to the next that is split.
+            let stay = self.entries[next..].iter().position(|e| e.key & 7 != 0);
+            let run = next..stay.map_or(self.entries.len(), |n| next + n);
+            if !run.is_empty() {
+                next = run.end;
+                triangles.extend_from_slice(&self.old.triangles[run.clone()]);
+                generation.extend_from_slice(&self.old.generation[run.clone()]);
+                region.extend_from_slice(&mesh.region[run.clone()]);
+                parent.extend(run.clone().map(|t| TriangleId(t as u32)));
+                neighbours.extend(self.old.neighbours[run].iter().map(|around| {
+                    let [a, b, c] = *around;
+                    [
+                        self.behind(a).0[0],
+                        self.behind(b).0[0],
+                        self.behind(c).0[0],
+                    ]
+                }));
+                continue;
+            }
+            let t = next;
+            next += 1;
+            let entry = self.entries[t];
             let corners = self.old.triangles[t];
             let around = self.old.neighbours[t];
             let old_generation = self.old.generation[t];
@@ -323,14 +352,6 @@ impl<'a> Plan<'a> {
                     let mine = entry.owns(face);
                     vertex[3 + face] = if mine { entry.born(face) } else { theirs };
                 }
-            }
-            if entry.key & 7 == 0 {
-                triangles.push(corners);
-                neighbours.push([outer[0], outer[2], outer[4]]);
-                generation.push(old_generation);
-                region.push(mesh.region[t]);
-                parent.push(TriangleId(t as u32));
-                continue;
             }
             let parts = &PARTS[(entry.key & 15) as usize];
             for part in 0..parts.count as usize & 7 {
@@ -383,6 +404,12 @@ impl<'a> Plan<'a> {
         };
         Ok((refined, parent))
     }
+}
+
+/// Number of ones among three bits; not every processor that this is compiled for counts them in one step.
+#[inline(always)]
+fn ones(bits: u8) -> u32 {
+    0b11_10_10_01_10_01_01_00 >> (2 * bits) & 3
 }
 
 /// A copy with room for `count` entries.

@@ -28,7 +28,7 @@ pub(crate) struct Parts {
     /// What lies behind every face of every part.
     links: [[u8; 3]; 4],
     /// The place that touches a face of the triangle near one of its ends; the same for both where the face is not split.
-    pub touching: [[u8; 2]; 3],
+    touching: [[u8; 2]; 3],
 }
 
 /// What lies behind a face of a part.
@@ -157,12 +157,27 @@ const fn outer(from: u8, to: u8) -> (usize, usize) {
 /// The parts for every set of split edges (bit `i`: face `i`) and parity of the generation (bit 3: odd).
 ///
 /// Sets without the refinement edge do not occur, apart from the empty one.
-pub(crate) static PARTS: [Parts; 16] = {
+pub(crate) static PARTS: [Parts; 16] = PARTS_OF_KEYS;
+
+const PARTS_OF_KEYS: [Parts; 16] = {
     let mut all = [Parts::NONE; 16];
     let mut key = 0;
     while key < 16 {
         all[key] = Parts::of(key & 7, key & 8 != 0);
         key += 1;
+    }
+    all
+};
+
+/// [`Parts::touching`] of all parts in one table, at `key << 2 | face`.
+pub(crate) static TOUCHING: [[u8; 2]; 64] = {
+    let mut all = [[0; 2]; 64];
+    let mut place = 0;
+    while place < 64 {
+        if place % 4 < 3 {
+            all[place] = PARTS_OF_KEYS[place / 4].touching[place % 4];
+        }
+        place += 1;
     }
     all
 };
