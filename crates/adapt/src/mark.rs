@@ -24,16 +24,63 @@ pub fn mark(squares: &[f64], settings: &Mark) -> Vec<TriangleId> {
     if marked.is_empty() { all() } else { marked }
 }
 
+/// Buckets of the histogram of positive numbers: all exponents, and eight steps in each.
+const BUCKETS: usize = 1 << 14;
+
+/// The bucket of a positive number; larger numbers are never in a lower one.
+#[inline(always)]
+fn bucket(square: f64) -> usize {
+    (square.to_bits() >> 49) as usize
+}
+
 /// A set of least cardinality whose squared indicators sum to at least `theta` times the total, in linear time.
 ///
-/// The largest indicators are found by repeated partition about the median, of which only one half is followed (Pfeiler,
-/// Praetorius, "Doerfler marking with minimal cardinality is a linear complexity problem", 2020). Ties go to
-/// the lower number, so the set is unique.
+/// A histogram tells the size of the smallest indicator in the set to a step of it; everything above is in the set, and what of that step belongs to it is
+/// found by [`largest`]. Ties go to the lower number, so the set is unique.
 fn doerfler(squares: &[f64], theta: f64) -> Vec<TriangleId> {
-    let mut order: Vec<u32> = (0..squares.len() as u32)
-        .filter(|&t| squares[t as usize] > 0.0)
-        .collect();
-    let mut missing = theta * order.iter().map(|&t| squares[t as usize]).sum::<f64>();
+    let mut histogram = vec![(0.0f64, 0usize); BUCKETS];
+    for &square in squares.iter().filter(|s| **s > 0.0) {
+        let (sum, count) = &mut histogram[bucket(square)];
+        *sum += square;
+        *count += 1;
+    }
+    let mut missing = theta * histogram.iter().map(|b| b.0).sum::<f64>();
+    // Everything above `step` is in the set and `missing` still lacks.
+    let (mut step, mut above) = (BUCKETS, 0);
+    while step > 0 {
+        step -= 1;
+        let (sum, count) = histogram[step];
+        if count > 0 && sum >= missing {
+            break;
+        }
+        if step > 0 {
+            missing -= sum;
+            above += count;
+        }
+    }
+    let numbers = || (0..squares.len() as u32).zip(squares);
+    let within = |square: f64| square > 0.0 && bucket(square) == step;
+    let candidates = numbers().filter(|(_, s)| within(**s)).map(|(t, _)| t);
+    let last = largest(squares, candidates.collect(), missing);
+    let mut marked = Vec::with_capacity(above + last.len());
+    let mut last = last.into_iter().peekable();
+    for (t, &square) in numbers() {
+        let in_last = last.peek() == Some(&t);
+        if in_last {
+            last.next();
+        }
+        if in_last || (square > 0.0 && bucket(square) > step) {
+            marked.push(TriangleId(t));
+        }
+    }
+    marked
+}
+
+/// The fewest of the triangles in `order` whose squares sum to `missing`, or all if they do not; increasing.
+///
+/// They are found by repeated partition about the median, of which only one half is followed (Pfeiler, Praetorius, "Doerfler marking with minimal
+/// cardinality is a linear complexity problem", 2020).
+fn largest(squares: &[f64], mut order: Vec<u32>, mut missing: f64) -> Vec<u32> {
     let (mut low, mut high) = (0, order.len());
     // Everything before `low` is in the set and `missing` still lacks; nothing from `high` on is needed.
     while high - low > 1 {
@@ -56,7 +103,7 @@ fn doerfler(squares: &[f64], theta: f64) -> Vec<TriangleId> {
     }
     order.truncate(high);
     order.sort_unstable();
-    order.into_iter().map(TriangleId).collect()
+    order
 }
 
 #[cfg(test)]
@@ -115,6 +162,30 @@ mod tests {
                 assert_eq!(marked, by_sorting(&squares, theta), "{n} {theta}");
             }
         }
+    }
+
+    #[test]
+    fn doerfler_takes_the_least_set_of_numbers_of_all_sizes() {
+        let mut state = 5u64;
+        let mut random = move || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            state >> 40
+        };
+        // Powers of two over sixteen octaves with three binary digits, zeros between them: sums are exact.
+        let squares: Vec<f64> = (0..3000)
+            .map(|_| match random() % 5 {
+                0 => 0.0,
+                _ => (8 + random() % 8) as f64 * 2f64.powi((random() % 16) as i32 - 30),
+            })
+            .collect();
+        for theta in [0.01, 0.25, 0.5, 0.9, 0.999] {
+            let marked = numbers(mark(&squares, &settings(Strategy::Doerfler, theta)));
+            assert_eq!(marked, by_sorting(&squares, theta), "{theta}");
+        }
+        let all = numbers(mark(&squares, &settings(Strategy::Doerfler, 1.0)));
+        assert_eq!(all.len(), squares.iter().filter(|s| **s > 0.0).count());
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! when the later one of its triangles is met, which has the normal at hand and finds the flux of the other one stored.
 
 use contact::{DiscreteProblem, Solution};
+use fem_core::integrate::Loads;
 use fem_core::{ElementValues, Mesh};
 
 use crate::action::nodal_action;
@@ -37,112 +38,168 @@ struct Corner {
     action: f64,
 }
 
-/// 1/mu_iK, found once for a constant.
-enum Inverse<'a> {
-    Same(f64),
-    Each(&'a ElementValues),
+/// The data of the elements, as the pass reads them.
+trait Data {
+    /// Whether the loads deviate from their means.
+    const VARYING: bool;
+
+    /// mu_iK.
+    fn tension(&self, i: usize, t: usize) -> f64;
+
+    /// 1/mu_iK.
+    fn softness(&self, i: usize, t: usize) -> f64;
+
+    /// 1/max(mu_iK, mu_iK') for two neighbours.
+    fn stiffer(&self, i: usize, t: usize, s: usize) -> f64;
+
+    /// f_ih.
+    fn mean(&self, i: usize, t: usize) -> f64;
 }
 
-impl Inverse<'_> {
-    fn of(mean: &ElementValues) -> Inverse<'_> {
-        match mean.same() {
-            Some(mean) => Inverse::Same(1.0 / mean),
-            None => Inverse::Each(mean),
-        }
+/// Loads and tensions that are the same everywhere.
+struct Constants {
+    tension: [f64; 2],
+    softness: [f64; 2],
+    load: [f64; 2],
+}
+
+impl Constants {
+    fn of(problem: &DiscreteProblem) -> Option<Constants> {
+        let [Some(m1), Some(m2)] = problem.tension_mean.each_ref().map(ElementValues::same) else {
+            return None;
+        };
+        let [Some(f1), Some(f2)] = problem.loads.each_ref().map(Loads::same) else {
+            return None;
+        };
+        Some(Constants {
+            tension: [m1, m2],
+            softness: [1.0 / m1, 1.0 / m2],
+            load: [f1, f2],
+        })
+    }
+}
+
+impl Data for Constants {
+    const VARYING: bool = false;
+
+    #[inline(always)]
+    fn tension(&self, i: usize, _: usize) -> f64 {
+        self.tension[i]
     }
 
     #[inline(always)]
-    fn at(&self, t: usize) -> f64 {
-        match self {
-            Inverse::Same(value) => *value,
-            Inverse::Each(mean) => 1.0 / mean[t],
-        }
+    fn softness(&self, i: usize, _: usize) -> f64 {
+        self.softness[i]
     }
 
-    /// 1 / max(mu_iK, mu_iK') for two neighbours.
     #[inline(always)]
-    fn stiffer(&self, t: usize, s: usize) -> f64 {
-        match self {
-            Inverse::Same(value) => *value,
-            Inverse::Each(mean) => 1.0 / mean[t].max(mean[s]),
-        }
+    fn stiffer(&self, i: usize, _: usize, _: usize) -> f64 {
+        self.softness[i]
+    }
+
+    #[inline(always)]
+    fn mean(&self, i: usize, _: usize) -> f64 {
+        self.load[i]
+    }
+}
+
+impl Data for &DiscreteProblem {
+    const VARYING: bool = true;
+
+    #[inline(always)]
+    fn tension(&self, i: usize, t: usize) -> f64 {
+        self.tension_mean[i][t]
+    }
+
+    #[inline(always)]
+    fn softness(&self, i: usize, t: usize) -> f64 {
+        1.0 / self.tension_mean[i][t]
+    }
+
+    #[inline(always)]
+    fn stiffer(&self, i: usize, t: usize, s: usize) -> f64 {
+        let mean = &self.tension_mean[i];
+        1.0 / mean[t].max(mean[s])
+    }
+
+    #[inline(always)]
+    fn mean(&self, i: usize, t: usize) -> f64 {
+        self.loads[i].mean(t)
     }
 }
 
 /// Passes over all triangles; the residual estimator is computed if it is wanted.
 pub fn sweep(mesh: &Mesh, problem: &DiscreteProblem, solution: &Solution, residual: bool) -> Sweep {
-    if residual {
-        pass::<true>(mesh, problem, solution)
-    } else {
-        pass::<false>(mesh, problem, solution)
+    match (Constants::of(problem), residual) {
+        (Some(data), true) => pass::<true, _>(mesh, problem, solution, &data),
+        (Some(data), false) => pass::<false, _>(mesh, problem, solution, &data),
+        (None, true) => pass::<true, _>(mesh, problem, solution, &problem),
+        (None, false) => pass::<false, _>(mesh, problem, solution, &problem),
     }
 }
 
 /// The pass; `RESIDUAL` says whether the estimator is computed.
-fn pass<const RESIDUAL: bool>(
+fn pass<const RESIDUAL: bool, D: Data>(
     mesh: &Mesh,
     problem: &DiscreteProblem,
     solution: &Solution,
+    data: &D,
 ) -> Sweep {
     let (corners, work) = corners::<RESIDUAL>(mesh, problem, solution);
+    let corners = &corners[..];
     let count = mesh.triangle_count();
     let room = if RESIDUAL { count } else { 0 };
-    let inverse = problem.tension_mean.each_ref().map(Inverse::of);
-    let varying = problem.loads.iter().any(|f| f.same().is_none());
+    let varying = D::VARYING && problem.loads.iter().any(|f| f.same().is_none());
     let mut squares: Vec<f64> = Vec::with_capacity(room);
     let mut fluxes: Vec<[[f64; 2]; 2]> = Vec::with_capacity(room);
     let mut oscillation = Vec::with_capacity(if varying { count } else { 0 });
     let mut weighted_oscillation = Vec::with_capacity(oscillation.capacity());
-    let (mut energy, mut largest, mut weighted_largest) = (0.0, 0.0f64, 0.0f64);
+    let (mut energy, mut largest, mut weighted_largest) = (0.0, 0.0, 0.0);
     for (t, (v, around)) in mesh.triangles().iter().zip(mesh.neighbours()).enumerate() {
-        let c = v.map(|j| corners[j.index()]);
-        // Edge k is opposite to corner k and runs counter-clockwise.
-        let edges = [0, 1, 2].map(|k| {
-            let (p, q) = (c[(k + 1) % 3].point, c[(k + 2) % 3].point);
-            [q[0] - p[0], q[1] - p[1]]
-        });
+        let [a, b, c] = v.map(|j| &corners[j.index()]);
+        // Edge k is opposite to corner k; all run counter-clockwise.
+        let edge = |p: &Corner, q: &Corner| [q.point[0] - p.point[0], q.point[1] - p.point[1]];
+        let edges = [edge(b, c), edge(c, a), edge(a, b)];
         let twice = edges[2][1] * edges[1][0] - edges[2][0] * edges[1][1];
         let area = 0.5 * twice;
-        let h2 = edges
-            .iter()
-            .map(|e| e[0] * e[0] + e[1] * e[1])
-            .fold(0.0f64, |h, l| if l > h { l } else { h });
+        let [l0, l1, l2] = edges.map(|e| e[0] * e[0] + e[1] * e[1]);
+        let h2 = larger(larger(l0, l1), l2);
         let over = 1.0 / twice;
+        let means = [data.mean(0, t), data.mean(1, t)];
+        let softness = [data.softness(0, t), data.softness(1, t)];
         let mut flux = [[0.0; 2]; 2];
-        let mut contribution = [0.0; 2];
         for i in 0..2 {
             // Differences first: a large common height must not cost digits.
-            let [d1, d2] = [1, 2].map(|k| c[k].displacement[i] - c[0].displacement[i]);
-            let gradient = [
-                -(d1 * edges[1][1] + d2 * edges[2][1]) * over,
-                (d1 * edges[1][0] + d2 * edges[2][0]) * over,
-            ];
-            let mu = problem.tension_mean[i][t];
-            flux[i] = gradient.map(|g| mu * g);
-            energy += area * (flux[i][0] * gradient[0] + flux[i][1] * gradient[1]);
-            let mean = problem.loads[i].mean(t);
-            contribution[i] = h2 * area * mean * mean;
+            let d1 = (b.displacement[i] - a.displacement[i]) * over;
+            let d2 = (c.displacement[i] - a.displacement[i]) * over;
+            let x = -(d1 * edges[1][1] + d2 * edges[2][1]);
+            let y = d1 * edges[1][0] + d2 * edges[2][0];
+            let mu = data.tension(i, t);
+            flux[i] = [mu * x, mu * y];
+            energy += area * (flux[i][0] * x + flux[i][1] * y);
         }
-        let softness = [inverse[0].at(t), inverse[1].at(t)];
-        largest = largest.max(contribution[0] + contribution[1]);
-        let weighted = contribution[0] * softness[0] + contribution[1] * softness[1];
-        weighted_largest = weighted_largest.max(weighted);
+        let weight = h2 * area;
+        let [f, g] = means.map(|f| f * f);
+        largest = larger(largest, weight * (f + g));
+        let weighted = weight * (f * softness[0] + g * softness[1]);
+        weighted_largest = larger(weighted_largest, weighted);
         if varying {
             let [f, g] = [0, 1].map(|i| problem.loads[i].deviation_squared(t));
             oscillation.push(h2 * (f + g));
             weighted_oscillation.push(h2 * (f * softness[0] + g * softness[1]));
         }
         if RESIDUAL {
-            let mut square = contact_term(
-                area,
-                c.map(|c| c.action),
-                c.map(|c| c.displacement[0] - c.displacement[1]),
-            );
-            let weight = h2 * area / 3.0;
-            for (i, sign) in [(0, 1.0), (1, -1.0)] {
-                let mean = problem.loads[i].mean(t);
-                let [a, b, c] = c.map(|c| mean + sign * c.action);
-                square += weight * softness[i] * (a * a + b * b + c * c);
+            let actions = [a.action, b.action, c.action];
+            let mut square = 0.0;
+            let mut sums = [0.0; 2];
+            for l in actions {
+                sums[0] += (means[0] + l) * (means[0] + l);
+                sums[1] += (means[1] - l) * (means[1] - l);
+            }
+            square += weight / 3.0 * (softness[0] * sums[0] + softness[1] * sums[1]);
+            if actions != [0.0; 3] {
+                let gap = |c: &Corner| c.displacement[0] - c.displacement[1];
+                square += contact_term(area, actions, [gap(a), gap(b), gap(c)]);
             }
             for (edge, next) in edges.iter().zip(around) {
                 let Some((other, _)) = next.get() else {
@@ -152,11 +209,11 @@ fn pass<const RESIDUAL: bool>(
                 if s >= t {
                     continue;
                 }
+                let (p, q) = (&flux, &fluxes[s]);
                 let mut half = 0.0;
                 for i in 0..2 {
-                    let (p, q) = (flux[i], fluxes[s][i]);
-                    let jump = (q[0] - p[0]) * edge[1] - (q[1] - p[1]) * edge[0];
-                    half += 0.5 * jump * jump * inverse[i].stiffer(t, s);
+                    let jump = (q[i][0] - p[i][0]) * edge[1] - (q[i][1] - p[i][1]) * edge[0];
+                    half += 0.5 * jump * jump * data.stiffer(i, t, s);
                 }
                 square += half;
                 squares[s] += half;
@@ -176,6 +233,12 @@ fn pass<const RESIDUAL: bool>(
         largest_contribution: largest.sqrt(),
         weighted_contribution: weighted_largest.sqrt(),
     }
+}
+
+/// The larger of two numbers, neither of which is a NaN: one instruction.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// The corners, and the work sum_i F_i' u_i of the loads.
@@ -269,8 +332,14 @@ mod tests {
         }
         close(found.largest_contribution, largest.sqrt(), 1e-14);
         close(found.weighted_contribution, weighted.sqrt(), 1e-14);
+        problem.loads = Loads::constant(&mesh, [-3.0, 2.0]);
+        problem.tension_mean = [0.5, 3.0].map(ElementValues::Same);
+        let constant = sweep(&mesh, &problem, &solution, true);
+        assert_eq!(constant.oscillation, None);
+        let squares = constant.residual.expect("wanted");
+        agree(&squares.roots(), &residual(&mesh, &problem, &solution));
         let without = sweep(&mesh, &problem, &solution, false);
         assert_eq!(without.residual, None);
-        assert_eq!(without.energy, found.energy);
+        assert_eq!(without.energy, constant.energy);
     }
 }

@@ -2,6 +2,9 @@
 
 use crate::compile::{Op, Operand, Program};
 use crate::function::{Binary, Unary};
+#[cfg(target_arch = "x86_64")]
+use crate::wide::Wide;
+use crate::wide::{Loops, Plain};
 use std::cell::RefCell;
 
 /// Points in a block: few enough that the registers stay in the first cache, and that a byte numbers a point.
@@ -52,6 +55,8 @@ pub(crate) fn evaluate(program: &Program, x: &[f64], y: &[f64], region: &[f64], 
         while scratch.registers.len() < program.registers {
             scratch.registers.push(vec![0.0; BLOCK]);
         }
+        #[cfg(target_arch = "x86_64")]
+        let wide = Wide::detect();
         for (block, out) in out.chunks_mut(BLOCK).enumerate() {
             let range = block * BLOCK..block * BLOCK + out.len();
             let inputs = Inputs {
@@ -63,7 +68,12 @@ pub(crate) fn evaluate(program: &Program, x: &[f64], y: &[f64], region: &[f64], 
                     Some(&region[range])
                 },
             };
-            run(program, inputs, scratch, out);
+            #[cfg(target_arch = "x86_64")]
+            if let Some(wide) = wide {
+                run(program, inputs, scratch, out, wide);
+                continue;
+            }
+            run(program, inputs, scratch, out, Plain);
         }
         scratch.registers.truncate(KEPT_REGISTERS);
     });
@@ -92,7 +102,7 @@ impl<'a> Inputs<'a> {
 
 /// The values of an operand over the block.
 #[derive(Clone, Copy)]
-enum Source<'a> {
+pub(crate) enum Source<'a> {
     Each(&'a [f64]),
     Same(f64),
 }
@@ -107,7 +117,13 @@ impl Source<'_> {
     }
 }
 
-fn run(program: &Program, inputs: Inputs, scratch: &mut Scratch, out: &mut [f64]) {
+fn run(
+    program: &Program,
+    inputs: Inputs,
+    scratch: &mut Scratch,
+    out: &mut [f64],
+    loops: impl Loops,
+) {
     let length = out.len();
     let Scratch {
         registers,
@@ -165,9 +181,9 @@ fn run(program: &Program, inputs: Inputs, scratch: &mut Scratch, out: &mut [f64]
             Active::List(start, end) => Some(&points[start..end]),
         };
         match *op {
-            Op::Unary(op, _, a) => unary(op, into, inputs.fetch(a, registers), list),
+            Op::Unary(op, _, a) => loops.unary(op, into, inputs.fetch(a, registers), list),
             Op::Binary(op, _, a, b) => {
-                binary(
+                loops.binary(
                     op,
                     into,
                     inputs.fetch(a, registers),
@@ -175,13 +191,10 @@ fn run(program: &Program, inputs: Inputs, scratch: &mut Scratch, out: &mut [f64]
                     list,
                 );
             }
-            Op::Select(_, c, a, b) => select(
-                into,
-                inputs.fetch(c, registers),
-                inputs.fetch(a, registers),
-                inputs.fetch(b, registers),
-                list,
-            ),
+            Op::Select(_, c, a, b) => {
+                let of = [c, a, b].map(|operand| inputs.fetch(operand, registers));
+                loops.select(into, of, list);
+            }
             Op::Copy(_, a) => map(into, inputs.fetch(a, registers), list, |a| a),
             Op::Split(..) | Op::Else(_) | Op::Join => {}
         }
@@ -282,7 +295,9 @@ fn zip(into: &mut [f64], a: Source, b: Source, list: Option<&[u8]>, f: impl Fn(f
     }
 }
 
-fn select(into: &mut [f64], c: Source, a: Source, b: Source, list: Option<&[u8]>) {
+/// Picks from the values where the condition, the first of the three, is true and false.
+#[inline(always)]
+pub(crate) fn choose(into: &mut [f64], [c, a, b]: [Source; 3], list: Option<&[u8]>) {
     let Source::Each(condition) = c else {
         let chosen = if c.at(0) != 0.0 { a } else { b };
         return map(into, chosen, list, |value| value);
@@ -323,7 +338,8 @@ fn select(into: &mut [f64], c: Source, a: Source, b: Source, list: Option<&[u8]>
     }
 }
 
-fn unary(op: Unary, into: &mut [f64], a: Source, list: Option<&[u8]>) {
+#[inline(always)]
+pub(crate) fn apply_unary(op: Unary, into: &mut [f64], a: Source, list: Option<&[u8]>) {
     // One loop for each operation, with the operation known in it.
     macro_rules! loops {
         ($($name:ident)*) => {
@@ -335,7 +351,14 @@ fn unary(op: Unary, into: &mut [f64], a: Source, list: Option<&[u8]>) {
     loops!(Neg Not Sin Cos Tan Asin Acos Atan Sinh Cosh Tanh Exp Ln Log10 Sqrt Cbrt Abs Sign Floor Ceil Step)
 }
 
-fn binary(op: Binary, into: &mut [f64], a: Source, b: Source, list: Option<&[u8]>) {
+#[inline(always)]
+pub(crate) fn apply_binary(
+    op: Binary,
+    into: &mut [f64],
+    a: Source,
+    b: Source,
+    list: Option<&[u8]>,
+) {
     macro_rules! loops {
         ($($name:ident)*) => {
             match op {

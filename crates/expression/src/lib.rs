@@ -59,6 +59,7 @@ mod names;
 mod parser;
 mod scope;
 mod token;
+mod wide;
 
 pub use error::{ParseError, ScopeError};
 pub use expression::{Expression, Variable};
