@@ -15,9 +15,7 @@ import numpy as np
 # Seven points, exact for polynomials of degree 5 (Strang and Fix).
 _A, _B = 0.470142064105115, 0.101286507323456
 _POINTS = [[1 / 3] * 3] + [
-    [c if k == j else (1 - c) / 2 for k in range(3)]
-    for c in (1 - 2 * _A, 1 - 2 * _B)
-    for j in range(3)
+    [c if k == j else (1 - c) / 2 for k in range(3)] for c in (1 - 2 * _A, 1 - 2 * _B) for j in range(3)
 ]
 _WEIGHTS = [0.225] + [0.132394152788506] * 3 + [0.125939180544827] * 3
 
@@ -26,10 +24,7 @@ def exact_gradients(x, y):
     """Gradients of u1 = p (1 + 2 q^2) and u2 = p (1 - q^2), p = (1 - x^2) (1 - y^2) / 3, q = max(x^2 + y^2 - 1/4, 0)."""
     a, b, q = 1 - x * x, 1 - y * y, np.maximum(x * x + y * y - 0.25, 0)
     p, p_x, p_y, q_x, q_y = a * b / 3, -2 * x * b / 3, -2 * y * a / 3, 2 * x, 2 * y
-    return [
-        (p_x * (1 + c * q * q) + 2 * c * p * q * q_x, p_y * (1 + c * q * q) + 2 * c * p * q * q_y)
-        for c in (2, -1)
-    ]
+    return [(p_x * (1 + c * q * q) + 2 * c * p * q * q_x, p_y * (1 + c * q * q) + 2 * c * p * q * q_y) for c in (2, -1)]
 
 
 def true_error(points, triangles, fields, block=1 << 15):
