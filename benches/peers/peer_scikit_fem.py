@@ -13,7 +13,7 @@ from skfem.models.poisson import laplace
 from harness import Harness
 
 MU1, MU2 = 1.0, 2.0
-THETA = 0.9  # Doerfler; 0.7 costs a fifth more for the same error
+THETA = 0.9  # Doerfler; 0.7 takes a fifth longer for the same error
 
 
 def loads(x):
@@ -103,6 +103,7 @@ def refine(mesh, fields, eta):
 
 def main():
     harness = Harness(["pyamg", "cholmod"])
+    # 14 cells a side: a level comes out just below an error of 0.005.
     mesh = skfem.MeshTri.init_tensor(np.linspace(-1, 1, 15), np.linspace(-1, 1, 15))
     s, w = np.zeros(mesh.nvertices), np.zeros(mesh.nvertices)
     fresh = True
