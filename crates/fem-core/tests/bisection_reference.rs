@@ -228,7 +228,7 @@ fn distorted_squares_with_any_labels() {
             let (b, c, d) = (a + 1, a + n as u32 + 2, a + n as u32 + 1);
             triangles.extend([[a, b, c], [a, c, d]]);
         }
-        let regions: Vec<i32> = (0..2 * n * n).map(|t| t as i32 % 5).collect();
+        let regions: Vec<i32> = (0..2 * n * n).map(|t| t % 5).collect();
         match Mesh::new(points, &triangles, &regions, None) {
             Ok(mesh) => assert!(compare(mesh, seed, 9) > 3),
             // A distortion may turn a triangle over.
