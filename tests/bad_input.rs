@@ -232,7 +232,7 @@ fn commands() {
         &["run", "."],
         &["run", "good.toml", "--out", "used"],
         &["run", "good.toml", "--out", "good.toml"],
-        &["run", "good.toml", "--threads", "4"],
+        &["run", "good.toml", "--threads", "0"],
         &["run", "good.toml", "--resume"],
         &["study", "good.toml", "--out", "x"],
         &["verify", "used"],

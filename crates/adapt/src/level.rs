@@ -165,11 +165,18 @@ impl Level {
         } = context;
         let clock = Instant::now();
         let certified = settings.estimate.wants(Estimator::Certified) && begin.forecast.is_none();
-        let (discrete, moments) = if certified {
-            let (discrete, moments) = discretise_with_moments(problem, &mesh)?;
-            (discrete, Some(moments))
+        let assemble = || {
+            if certified {
+                let (discrete, moments) = discretise_with_moments(problem, &mesh)?;
+                Ok::<_, DataError>((discrete, Some(moments)))
+            } else {
+                Ok((discrete(&mesh)?, None))
+            }
+        };
+        let (discrete, moments) = if settings.solve.threads > 1 {
+            beside(|| workspace.read(&mesh, &settings.solve), assemble).1?
         } else {
-            (discrete(&mesh)?, None)
+            assemble()?
         };
         let seconds_assemble = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
@@ -410,6 +417,19 @@ impl Level {
         self.record.seconds_total = context.begun.elapsed().as_secs_f64();
         self.record.peak_memory_mb = peak_memory_mb();
     }
+}
+
+/// Does two things side by side.
+fn beside<A: Send, B>(first: impl FnOnce() -> A + Send, second: impl FnOnce() -> B) -> (A, B) {
+    std::thread::scope(|scope| {
+        let first = scope.spawn(first);
+        let second = second();
+        let first = first.join();
+        (
+            first.unwrap_or_else(|e| std::panic::resume_unwind(e)),
+            second,
+        )
+    })
 }
 
 /// Whether an estimate of every level needs sigma.

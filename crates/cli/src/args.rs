@@ -1,6 +1,7 @@
 //! What the user typed, and what that asks for.
 
 use std::ffi::OsString;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -83,8 +84,9 @@ pub struct RunArgs {
     /// Print the summary as a JSON object instead of the final line
     #[arg(long)]
     pub json: bool,
-    #[arg(long, hide = true, value_name = "N")]
-    threads: Option<String>,
+    /// Threads that may be used; the results are the same to the byte [default: all cores]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
     #[arg(long, hide = true)]
     resume: bool,
 }
@@ -140,7 +142,6 @@ fn understand(arguments: impl IntoIterator<Item = OsString>) -> Result<Task, cla
         .command;
     let later = |name: &str| Ok(Task::Later(format!("membranes {name}")));
     match command {
-        Command::Run(run) if run.threads.is_some() => Ok(Task::Later("--threads".into())),
         Command::Run(run) if run.resume => Ok(Task::Later("--resume".into())),
         Command::Run(run) => Ok(Task::Run(run)),
         Command::Check(check) => Ok(Task::Check(check)),
@@ -197,6 +198,9 @@ mod tests {
         assert_eq!(run.set, ["b=1", "c=2"]);
         assert_eq!(run.out, Some(PathBuf::from("d")));
         assert!(run.force && !run.quiet && !run.json);
+        assert_eq!(run.threads, None);
+        let threads = parsed("membranes run a.toml --threads 3");
+        assert!(matches!(threads, Ok(Task::Run(r)) if r.threads == NonZeroUsize::new(3)));
         assert!(matches!(parsed("membranes check a.toml --json"), Ok(Task::Check(c)) if c.json));
         let verify = parsed("membranes verify runs/a --json");
         assert!(matches!(verify, Ok(Task::Verify(v)) if v.json && v.folder.ends_with("runs/a")));
@@ -211,7 +215,6 @@ mod tests {
         assert_eq!(later("membranes study a.toml --out d"), "membranes study");
         assert_eq!(later("membranes verify d --threads 2"), "--threads");
         assert_eq!(later("membranes plot --help"), "membranes plot");
-        assert_eq!(later("membranes run a.toml --threads 4"), "--threads");
         assert_eq!(later("membranes run a.toml --resume"), "--resume");
     }
 
@@ -224,6 +227,8 @@ mod tests {
             "membranes verify",
             "membranes verify a b",
             "membranes run a --nope",
+            "membranes run a --threads 0",
+            "membranes run a --threads many",
         ] {
             assert_eq!(parsed(text), Err(2), "{text}");
         }

@@ -1,5 +1,6 @@
 //! `membranes run`.
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use adapt::output::{Ending, RunFolder};
@@ -18,7 +19,9 @@ use crate::progress::Progress;
 /// Whatever came before the first level, or could not be written. A numerical failure after that is reported here
 /// too, when the last good level is safe.
 pub fn run(arguments: &RunArgs) -> Result<u8, Failure> {
-    let scene = scene::load(&arguments.scene, &arguments.set)?;
+    let mut scene = scene::load(&arguments.scene, &arguments.set)?;
+    let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    scene.settings.solve.threads = arguments.threads.map_or_else(cores, NonZeroUsize::get);
     let out = match &arguments.out {
         Some(out) => out.clone(),
         None => default_folder(&arguments.scene),

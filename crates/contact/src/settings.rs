@@ -41,8 +41,22 @@ pub struct Settings {
     /// stop; scaled units. A tenth of the error to be expected from the mesh loses nothing.
     pub energy_target: Option<f64>,
     /// Whether sigma is computed. It is always solved to rounding, so that on a level that is only passed it would cost multigrid more
-    /// than all the rest; without it [`crate::Solution::sigma`] is zero until [`crate::add_sigma`].
+    /// than all the rest; without it [`crate::Solution::sigma`] is empty until [`crate::add_sigma`].
     pub sigma: bool,
+    /// How many threads multigrid may use: with more than one, mean and gap of a reduced model are solved side by side. The result is the
+    /// same to the bit.
+    pub threads: usize,
+}
+
+impl Settings {
+    /// Whether a problem with so many vertices is solved by multigrid, if its mesh has a hierarchy.
+    pub(crate) fn iterates(&self, vertices: usize) -> bool {
+        match self.solver {
+            Solver::Multigrid => true,
+            Solver::Auto => vertices >= crate::MULTIGRID_FROM,
+            Solver::ActiveSet | Solver::Clarabel => false,
+        }
+    }
 }
 
 impl Default for Settings {
@@ -53,6 +67,7 @@ impl Default for Settings {
             reduce: true,
             energy_target: None,
             sigma: true,
+            threads: 1,
         }
     }
 }

@@ -83,11 +83,10 @@ pub fn solve_in(
     let solution = match settings.solver {
         Solver::Clarabel if !trivial => direct(Method::InteriorPoint)?,
         Solver::Clarabel | Solver::ActiveSet => direct(Method::ActiveSet)?,
-        Solver::Multigrid => by_multigrid(problem, settings, start, workspace)?,
-        Solver::Auto if problem.order() >= MULTIGRID_FROM => {
+        Solver::Multigrid | Solver::Auto if settings.iterates(problem.order()) => {
             by_multigrid(problem, settings, start, workspace)?
         }
-        Solver::Auto => {
+        Solver::Auto | Solver::Multigrid => {
             let mut level = Level::new(problem, settings);
             let first = level.solve(Method::ActiveSet, start)?;
             if first.info.status == Status::Converged {
@@ -110,12 +109,7 @@ pub fn add_sigma(
     solution: &mut Solution,
     workspace: &mut Workspace,
 ) -> Result<(), SolveError> {
-    let iterative = match settings.solver {
-        Solver::Multigrid => true,
-        Solver::Auto => problem.order() >= MULTIGRID_FROM,
-        Solver::ActiveSet | Solver::Clarabel => false,
-    };
-    let found = if iterative {
+    let found = if settings.iterates(problem.order()) {
         multigrid::sigma(problem, settings, &solution.force, workspace).unwrap_or_default()
     } else {
         None

@@ -61,6 +61,11 @@ impl<U: Unknowns> MacroSolver<U> {
         self.factorisations = 0;
     }
 
+    /// Whether every matrix is factored for itself, so that a solution does not depend on those before it.
+    pub fn is_small(&self) -> bool {
+        self.always
+    }
+
     /// The pattern; it is analysed when it is factored first.
     fn new(hierarchy: &Hierarchy) -> MacroSolver<U> {
         let n0 = hierarchy.initial();

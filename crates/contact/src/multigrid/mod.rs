@@ -71,12 +71,20 @@ struct Store<U: Unknowns> {
     held: Option<Role>,
     finest: Finest<U>,
     levels: Levels<U>,
+    /// Matrices of the levels for a second field beside the first.
+    beside: Levels<U>,
 }
 
 impl Workspace {
-    /// Takes in the mesh of a problem; false if it has no hierarchy.
-    fn take(&mut self, problem: &DiscreteProblem) -> bool {
-        let mesh = &problem.mesh;
+    /// Reads the hierarchy of a mesh ahead of a solve on it, if that will be by multigrid: something to do beside the assembly.
+    pub fn read(&mut self, mesh: &Arc<Mesh>, settings: &Settings) {
+        if settings.iterates(mesh.vertex_count()) {
+            self.take(mesh);
+        }
+    }
+
+    /// Takes in a mesh; false if it has no hierarchy.
+    fn take(&mut self, mesh: &Arc<Mesh>) -> bool {
         if self.mesh.as_ptr() == Arc::as_ptr(mesh) {
             return true;
         }
@@ -130,7 +138,7 @@ pub(crate) fn solve(
     start: Option<&Start>,
     workspace: &mut Workspace,
 ) -> Result<Option<Solution>, SolveError> {
-    if !workspace.take(problem) {
+    if !workspace.take(&problem.mesh) {
         return Ok(None);
     }
     let Workspace {
@@ -160,7 +168,7 @@ pub(crate) fn sigma(
     force: &[f64],
     workspace: &mut Workspace,
 ) -> Result<Option<Vec<f64>>, SolveError> {
-    if !workspace.take(problem) {
+    if !workspace.take(&problem.mesh) {
         return Ok(None);
     }
     let run = Run {
@@ -217,32 +225,32 @@ impl Run<'_> {
                 Role::Stiffness => tension[t],
             }
         });
-        let Store { finest, levels, .. } = store;
-        levels.sweep(hierarchy, finest, &[])?;
+        let Store {
+            finest,
+            levels,
+            beside,
+            ..
+        } = store;
+        let finest = &*finest;
         let [mean_weight, gap_weight] = model.energy_weights();
-        let boundary = |j: usize| model.mean_of([0, 1].map(|i| problem.heights[i][j]));
-        let initial = |j: usize| {
-            self.start
-                .map_or(0.0, |s| model.mean_of([0, 1].map(|i| s.displacement[i][j])))
+        let mean_goal = self.goal(mean_weight, Goal::Tight);
+        let gap_goal = self.goal(gap_weight, Goal::Kkt(0.5 * SHARE * self.kkt()));
+        // Only a KKT residual is relative to the mean, and a large initial mesh keeps its factor from the one to the other.
+        let apart = matches!(gap_goal, Goal::Energy(_)) && levels.initial.is_small();
+        let (mean, gap) = if apart && self.settings.threads > 1 {
+            beside.fit(hierarchy);
+            std::thread::scope(|scope| {
+                let mean = scope.spawn(|| self.mean(model, finest, beside, mean_goal));
+                let gap = self.gap(model, finest, levels, gap_goal, 0.0);
+                let mean = mean.join().unwrap_or_else(|e| std::panic::resume_unwind(e));
+                Ok::<_, SolveError>((mean?, gap?))
+            })?
+        } else {
+            let mean = self.mean(model, finest, levels, mean_goal)?;
+            let size = mean.x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+            let gap = self.gap(model, finest, levels, gap_goal, size)?;
+            (mean, gap)
         };
-        let load = |j: usize| model.mean_load(j);
-        let vectors = self.vectors(finest, levels, boundary, initial, load, true);
-        let goal = self.goal(mean_weight, Goal::Tight);
-        let mean = self.descend(finest, levels, None, vectors, goal)?;
-        let size = mean.x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let boundary = |j: usize| problem.heights[0][j] - problem.heights[1][j];
-        let initial = |j: usize| {
-            self.start.map_or(0.0, |s| {
-                (s.displacement[0][j] - s.displacement[1][j]).max(0.0)
-            })
-        };
-        let load = |j: usize| model.gap_load(j).0;
-        let mut vectors = self.vectors(finest, levels, boundary, initial, load, true);
-        // Half the gap and the mean are bounds of the largest displacement from below.
-        vectors.boundary_size = vectors.boundary_size.max(2.0 * size);
-        let goal = self.goal(gap_weight, Goal::Kkt(0.5 * SHARE * self.kkt()));
-        let scale = |j: usize| model.gap_load(j).1;
-        let gap = self.descend(finest, levels, Some(&scale), vectors, goal)?;
 
         // The pull on a closed gap becomes the force, where it is more than rounding.
         let n = hierarchy.len();
@@ -296,6 +304,50 @@ impl Run<'_> {
             error_squared,
         };
         self.finish(model, store)
+    }
+
+    /// The mean of a reduced model.
+    fn mean(
+        &self,
+        model: &Proportional,
+        finest: &Finest<Scalar>,
+        levels: &mut Levels<Scalar>,
+        goal: Goal,
+    ) -> Result<Solved<Scalar>, SolveError> {
+        levels.sweep(self.hierarchy, finest, &[])?;
+        let heights = &self.problem.heights;
+        let boundary = |j: usize| model.mean_of([0, 1].map(|i| heights[i][j]));
+        let initial = |j: usize| {
+            self.start
+                .map_or(0.0, |s| model.mean_of([0, 1].map(|i| s.displacement[i][j])))
+        };
+        let load = |j: usize| model.mean_load(j);
+        let vectors = self.vectors(finest, levels, boundary, initial, load, true);
+        self.descend(finest, levels, None, vectors, goal)
+    }
+
+    /// The gap of a reduced model; `size` is the largest mean.
+    fn gap(
+        &self,
+        model: &Proportional,
+        finest: &Finest<Scalar>,
+        levels: &mut Levels<Scalar>,
+        goal: Goal,
+        size: f64,
+    ) -> Result<Solved<Scalar>, SolveError> {
+        let heights = &self.problem.heights;
+        let boundary = |j: usize| heights[0][j] - heights[1][j];
+        let initial = |j: usize| {
+            self.start.map_or(0.0, |s| {
+                (s.displacement[0][j] - s.displacement[1][j]).max(0.0)
+            })
+        };
+        let load = |j: usize| model.gap_load(j).0;
+        let mut vectors = self.vectors(finest, levels, boundary, initial, load, false);
+        // Half the gap and the mean are bounds of the largest displacement from below.
+        vectors.boundary_size = vectors.boundary_size.max(2.0 * size);
+        let scale = |j: usize| model.gap_load(j).1;
+        self.descend(finest, levels, Some(&scale), vectors, goal)
     }
 
     fn pair(

@@ -110,6 +110,7 @@ pub fn multigrid(tolerance: Tolerance, reduce: bool) -> Settings {
         reduce,
         energy_target: None,
         sigma: true,
+        threads: 1,
     }
 }
 
