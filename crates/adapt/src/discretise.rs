@@ -78,7 +78,8 @@ pub fn discretise_carried(
     Ok(discrete)
 }
 
-/// The same with the moments that the certificate needs; the data are sampled once for both.
+/// The same with the moments that the certificate needs. The loads are those of [`discretise`] to the last bit; the moments come from the same
+/// points.
 ///
 /// # Errors
 /// As [`discretise`].
@@ -91,7 +92,7 @@ pub fn discretise_with_moments(
         let tension = [&*problem.tension[0], &*problem.tension[1]];
         let reference = Reference::of(&problem.mesh, load)?;
         let moments = Moments::relative_to(&reference, mesh, load, tension)?;
-        Ok((moments.loads(mesh), moments))
+        Ok((load_pair_relative_to(&reference, mesh, load)?, moments))
     })
 }
 
