@@ -52,15 +52,14 @@ pub struct Before<'a> {
     pub parent: &'a [TriangleId],
 }
 
-/// Integrates the data and assembles the matrices on a mesh.
+/// Integrates the data on a mesh.
 ///
 /// # Errors
 /// [`DataError`] where data are not finite, a tension is not positive, or g1 < g2.
 pub fn discretise(problem: &Problem, mesh: &Arc<Mesh>) -> Result<DiscreteProblem, DataError> {
     let load = [&*problem.load[0], &*problem.load[1]];
     let loads = || load_pair_relative_to(&Reference::of(&problem.mesh, load)?, mesh, load);
-    let (discrete, ()) = assemble(problem, mesh, None, || Ok((loads()?, ())))?;
-    Ok(discrete)
+    assemble(problem, mesh, None, loads)
 }
 
 /// The same for a refined mesh, bit for bit: data are sampled on the triangles that are new.
@@ -74,33 +73,34 @@ pub fn discretise_carried(
 ) -> Result<DiscreteProblem, DataError> {
     let load = [&*problem.load[0], &*problem.load[1]];
     let loads = || load_pair_carried(mesh, load, &before.discrete.loads, before.parent);
-    let (discrete, ()) = assemble(problem, mesh, Some(before), || Ok((loads()?, ())))?;
-    Ok(discrete)
+    assemble(problem, mesh, Some(before), loads)
 }
 
-/// The same with the moments that the certificate needs; the data are sampled once for both.
+/// The moments of the data that the certificate needs, from the same points as the loads.
 ///
 /// # Errors
 /// As [`discretise`].
-pub fn discretise_with_moments(
-    problem: &Problem,
-    mesh: &Arc<Mesh>,
-) -> Result<(DiscreteProblem, Moments), DataError> {
-    assemble(problem, mesh, None, || {
-        let load = [&*problem.load[0], &*problem.load[1]];
-        let tension = [&*problem.tension[0], &*problem.tension[1]];
-        let reference = Reference::of(&problem.mesh, load)?;
-        let moments = Moments::relative_to(&reference, mesh, load, tension)?;
-        Ok((moments.loads(mesh), moments))
-    })
+pub fn moments(problem: &Problem, discrete: &DiscreteProblem) -> Result<Moments, DataError> {
+    let load = [&*problem.load[0], &*problem.load[1]];
+    let tension = [&*problem.tension[0], &*problem.tension[1]];
+    let reference = match discrete.loads[0].reference() {
+        Some(reference) => reference,
+        None => Reference::of(&problem.mesh, load)?,
+    };
+    Ok(Moments::relative_to(
+        &reference,
+        &discrete.mesh,
+        load,
+        tension,
+    )?)
 }
 
-fn assemble<T>(
+fn assemble(
     problem: &Problem,
     mesh: &Arc<Mesh>,
     before: Option<Before<'_>>,
-    loads: impl FnOnce() -> Result<([Loads; 2], T), FieldError>,
-) -> Result<(DiscreteProblem, T), DataError> {
+    loads: impl FnOnce() -> Result<[Loads; 2], FieldError>,
+) -> Result<DiscreteProblem, DataError> {
     let physical = |v: f64| fem_core::scale::times_power_of_two(v, problem.scale.length);
     let mean = |i: usize| {
         let field = &*problem.tension[i];
@@ -130,10 +130,11 @@ fn assemble<T>(
         let excess = fem_core::scale::times_power_of_two(excess, problem.scale.displacement());
         return Err(DataError::Heights { x, y, excess });
     }
-    let (loads, rest) = loads()?;
-    Ok((
-        DiscreteProblem::new(mesh.clone(), tension, loads, heights),
-        rest,
+    Ok(DiscreteProblem::new(
+        mesh.clone(),
+        tension,
+        loads()?,
+        heights,
     ))
 }
 

@@ -7,9 +7,7 @@ use contact::{DiscreteProblem, Solution, Start, Tolerance, Workspace};
 use estimate::{Grade, Moments};
 use fem_core::{Mesh, TriangleId};
 
-use crate::discretise::{
-    Before, DataError, discretise, discretise_carried, discretise_with_moments,
-};
+use crate::discretise::{Before, DataError, discretise, discretise_carried, moments};
 use crate::estimates::Estimates;
 use crate::output::memory::peak_memory_mb;
 use crate::problem::Problem;
@@ -138,21 +136,15 @@ impl Level {
             forecast: forecast.on(&mesh),
             seconds_refine: clock.elapsed().as_secs_f64(),
         };
-        let discrete = |mesh: &Arc<Mesh>| {
-            if self.moments.is_some() {
-                // Loads that came from the moments of a certificate are not carried over.
-                return discretise(context.problem, mesh);
-            }
-            let before = Before {
-                discrete: &self.discrete,
-                parent: &refinement.parent,
-            };
-            discretise_carried(context.problem, mesh, before)
+        let before = Before {
+            discrete: &self.discrete,
+            parent: &refinement.parent,
         };
+        let discrete = |mesh: &Arc<Mesh>| discretise_carried(context.problem, mesh, before);
         Level::on(Arc::new(mesh), context, discrete, begin, workspace)
     }
 
-    /// Solves and estimates on a mesh; `discrete` finds the discrete problem where there will be no certificate.
+    /// Solves and estimates on a mesh; `discrete` finds the discrete problem.
     fn on(
         mesh: Arc<Mesh>,
         context: Context<'_>,
@@ -166,12 +158,9 @@ impl Level {
         let clock = Instant::now();
         let certified = settings.estimate.wants(Estimator::Certified) && begin.forecast.is_none();
         let assemble = || {
-            if certified {
-                let (discrete, moments) = discretise_with_moments(problem, &mesh)?;
-                Ok::<_, DataError>((discrete, Some(moments)))
-            } else {
-                Ok((discrete(&mesh)?, None))
-            }
+            let discrete = discrete(&mesh)?;
+            let moments = certified.then(|| moments(problem, &discrete)).transpose()?;
+            Ok::<_, DataError>((discrete, moments))
         };
         let (discrete, moments) = if settings.solve.threads > 1 {
             beside(|| workspace.read(&mesh, &settings.solve), assemble).1?
@@ -272,36 +261,14 @@ impl Level {
     }
 
     /// Makes the certificate that was left out, for a level that may be the last or whose goal is near.
-    ///
-    /// The loads become those of its moments, and the solution follows them.
-    pub(crate) fn certify(
-        &mut self,
-        context: Context<'_>,
-        workspace: &mut Workspace,
-    ) -> Result<(), LevelError> {
+    pub(crate) fn certify(&mut self, context: Context<'_>) -> Result<(), LevelError> {
         let Context {
             problem, settings, ..
         } = context;
         let clock = Instant::now();
-        let (discrete, moments) = discretise_with_moments(problem, &self.mesh)?;
-        self.record.seconds_assemble += clock.elapsed().as_secs_f64();
-        let constant = problem.load.iter().all(|load| load.constant().is_some());
-        self.discrete.loads = discrete.loads;
-        self.moments = Some(moments);
+        self.moments = Some(moments(problem, &self.discrete)?);
         self.forecast = None;
-        if !constant {
-            let clock = Instant::now();
-            let solve = contact::Settings {
-                energy_target: self.estimates.error_size.map(|size| BALANCE * size),
-                sigma: needs_sigma(problem, settings),
-                ..settings.solve
-            };
-            let start = Start::again(&self.solution);
-            let mut better = contact::solve_in(&self.discrete, &solve, Some(&start), workspace)?;
-            better.info.iterations += self.solution.info.iterations;
-            self.solution = better;
-            self.record.seconds_solve += clock.elapsed().as_secs_f64();
-        }
+        self.record.seconds_assemble += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         self.estimates = Estimates::of(
             &self.mesh,

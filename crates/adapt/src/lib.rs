@@ -22,7 +22,7 @@ pub mod run;
 pub mod settings;
 
 pub use assurance::Assurance;
-pub use discretise::{Before, DataError, discretise, discretise_carried, discretise_with_moments};
+pub use discretise::{Before, DataError, discretise, discretise_carried, moments};
 pub use estimates::Estimates;
 pub use level::Level;
 pub use mark::mark;

@@ -91,7 +91,7 @@ fn finish(
         if reason(level, NEAR * factor * level.estimates.reachable).is_none() {
             return Ok(None);
         }
-        level.certify(context, workspace)?;
+        level.certify(context)?;
     }
     if reason(level, factor * level.estimates.reachable).is_none() {
         return Ok(None);

@@ -11,7 +11,7 @@
 //! On the dual cell's share K cap D_j the hat function of j has the integral 11|K|/54 and each other one 7|K|/108. c_K is what
 //! action times gap leaves where the contact set ends inside an element; it is of higher order.
 //!
-//! This is the estimator as it is written; [`crate::sweep`] finds the same numbers together with others in a single pass.
+//! This is the estimator as it is written; [`mod@crate::sweep`] finds the same numbers together with others in a single pass.
 
 use contact::{DiscreteProblem, Solution};
 use fem_core::Mesh;

@@ -1,6 +1,6 @@
 //! One pass over the triangles for everything cheap that a level is judged by.
 //!
-//! The [residual estimator](crate::residual), the [oscillation](crate::oscillation), the [energy](crate::energy) and the largest contribution of the
+//! The [residual estimator](mod@crate::residual), the [oscillation](mod@crate::oscillation), the [energy](mod@crate::energy) and the largest contribution of the
 //! loads need areas, gradients and diameters of all triangles. They are found once here, in the order of the mesh; a jump over an edge is added
 //! when the later one of its triangles is met, which has the normal at hand and finds the flux of the other one stored.
 

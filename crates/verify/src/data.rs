@@ -14,7 +14,7 @@ pub(crate) struct Discrete<'a> {
     pub mesh: &'a Mesh,
     /// The units.
     pub scale: Scale,
-    /// Moments of the data, on a level with a certificate; the loads are theirs there, so that they cancel in it.
+    /// Moments of the data, on a level with a certificate.
     pub moments: Option<Moments>,
     /// Its triangles.
     pub elements: Vec<Element>,
@@ -73,16 +73,12 @@ impl<'a> Discrete<'a> {
         let moments = certified
             .then(|| Moments::relative_to(&reference, mesh, load, tension))
             .transpose()?;
-        let loads = match &moments {
-            Some(moments) => moments.loads(mesh),
-            None => load_pair_relative_to(&reference, mesh, load)?,
-        };
         let pair = |fields: &[std::sync::Arc<dyn Field>; 2]| {
             Ok::<_, FieldError>([means(mesh, &*fields[0])?, means(mesh, &*fields[1])?])
         };
         Ok(Discrete {
             tension: pair(&problem.tension)?,
-            loads,
+            loads: load_pair_relative_to(&reference, mesh, load)?,
             heights: [
                 heights(mesh, &*problem.height[0])?,
                 heights(mesh, &*problem.height[1])?,

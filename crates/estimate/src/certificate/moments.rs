@@ -5,7 +5,7 @@
 //! what cancels between loads and action cancels between their moments too.
 
 use fem_core::integrate::{
-    ElementLoad, Integrand, Judgement, LOAD_CONTROL, Loads, Piece, Reference, integrate, judge_load,
+    Integrand, Judgement, LOAD_CONTROL, Piece, Reference, integrate, judge_load,
 };
 use fem_core::quadrature::affine_fit;
 use fem_core::{Field, FieldError, Mesh, Samples};
@@ -107,8 +107,6 @@ pub struct Moments {
     pub(super) jumps: usize,
     /// Whether all samples of loads and tensions in the element are equal; empty where all data are constants.
     varied: Vec<bool>,
-    /// A value of f_i in the element, and the first two moments of f_i minus that value.
-    spread: [Vec<[f64; 3]>; 2],
     /// What the elements are judged by.
     reference: Reference,
 }
@@ -159,7 +157,6 @@ impl Moments {
                 stiffness_low: [m1, m2].map(Values::Constant),
                 jumps: 0,
                 varied: Vec::new(),
-                spread: [Vec::new(), Vec::new()],
                 reference: *reference,
             });
         }
@@ -176,7 +173,6 @@ impl Moments {
             stiffness_low: [0, 1].map(|i| per_element(i, |m| m, f64::INFINITY)),
             jumps: 0,
             varied: vec![false; count],
-            spread: [vec![[0.0; 3]; count], vec![[0.0; 3]; count]],
             reference: *reference,
         };
         let range = varying.map(|v| vec![NOTHING; if v { count } else { 0 }]);
@@ -212,35 +208,6 @@ impl Moments {
     /// Whether all data are constant in every element.
     pub(super) fn all_uniform(&self) -> bool {
         !self.varied.contains(&true)
-    }
-
-    /// The load vectors, means and deviations, as [`fem_core::integrate::load_pair_relative_to`] finds them.
-    pub fn loads(&self, mesh: &Mesh) -> [Loads; 2] {
-        [0, 1].map(|i| {
-            let loads = match &self.load[i] {
-                Integrals::Constant(value) => {
-                    let [loads] = Loads::constant(mesh, [*value]);
-                    loads
-                }
-                Integrals::Each(_) => Loads::new(mesh, self.elements(mesh, i)),
-            };
-            loads.relative_to(self.reference)
-        })
-    }
-
-    /// The integrals of a load over every triangle.
-    fn elements(&self, mesh: &Mesh, i: usize) -> Vec<ElementLoad> {
-        let element = |t: usize, area: f64| {
-            let [base, first, second] = self.spread[i][t];
-            ElementLoad {
-                corners: [0, 1].map(|k| self.load[i].hat(t, area, k)),
-                mean: base + first / area,
-                deviation_squared: (second - first * first / area).max(0.0),
-            }
-        };
-        mesh.triangle_ids()
-            .map(|id| element(id.index(), mesh.area(id)))
-            .collect()
     }
 }
 
@@ -290,8 +257,6 @@ impl Integrand for Sums<'_> {
         moments.load[1].each()[t] = [0.0; 6];
         moments.action.each()[t] = [0.0; 6];
         moments.varied[t] = false;
-        moments.spread[0][t] = [0.0; 3];
-        moments.spread[1][t] = [0.0; 3];
         self.first[t] = None;
         for i in (0..2).filter(|&i| self.varying[i]) {
             moments.softness[i].each()[t] = 0.0;
@@ -311,13 +276,6 @@ impl Integrand for Sums<'_> {
             let weight = point.weight * piece.area;
             let [f1, f2, m1, m2] = sample;
             let action = contact_action([m1, m2], [f1, f2]);
-            for i in 0..2 {
-                let [base, one, two] = &mut moments.spread[i][t];
-                *base = first[i];
-                let d = sample[i] - first[i];
-                *one += weight * d;
-                *two += weight * d * d;
-            }
             let shapes = [
                 at[0] * at[0],
                 at[1] * at[1],

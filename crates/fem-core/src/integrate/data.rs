@@ -108,6 +108,11 @@ impl Loads {
         }
     }
 
+    /// What the elements were judged by; none of loads that were found elsewhere.
+    pub fn reference(&self) -> Option<Reference> {
+        self.reference
+    }
+
     /// The value of a load that is the same everywhere by the way it is stored; O(1).
     #[inline]
     pub fn same(&self) -> Option<f64> {

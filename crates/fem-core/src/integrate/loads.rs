@@ -283,14 +283,17 @@ impl Integrand for LoadPair<'_> {
             let Some(base) = self.elements[i].get(piece.triangle).map(|e| e.mean) else {
                 continue;
             };
-            let sums = &mut sums[piece.triangle];
+            // By itself first: a large element has very many points, and rounding goes with the number of additions to one sum.
+            let mut own = [0.0; 4];
             for ((p, at), v) in piece.rule.iter().zip(piece.at).zip(piece.values(i)) {
-                let w = p.weight * piece.area;
                 let d = v - base;
-                sums[0] += w * at[0] * v;
-                sums[1] += w * at[1] * v;
-                sums[2] += w * d;
-                sums[3] += w * d * d;
+                own[0] += p.weight * at[0] * v;
+                own[1] += p.weight * at[1] * v;
+                own[2] += p.weight * d;
+                own[3] += p.weight * d * d;
+            }
+            for (sum, own) in sums[piece.triangle].iter_mut().zip(own) {
+                *sum += piece.area * own;
             }
         }
     }
