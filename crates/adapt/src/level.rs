@@ -58,6 +58,8 @@ pub(crate) struct Forecast {
     quotient: Option<f64>,
     /// Vertices of that level.
     vertices: usize,
+    /// Quotient of eta_alg and the algebraic error as estimated, over the root of the number of vertices: it grows like 1/h.
+    leak: Option<f64>,
 }
 
 impl Forecast {
@@ -66,6 +68,11 @@ impl Forecast {
         if let Some(quotient) = level.estimates.quotient() {
             self.quotient = Some(quotient);
             self.vertices = level.mesh.vertex_count();
+            let certificate = level.estimates.certificate.as_ref();
+            let algebraic = level.solution.info.algebraic_error.filter(|&e| e > 0.0);
+            self.leak = certificate.zip(algebraic).map(|(certificate, algebraic)| {
+                certificate.algebraic / algebraic / (self.vertices as f64).sqrt()
+            });
         }
     }
 
@@ -234,15 +241,7 @@ impl Level {
                 return Ok(());
             };
             let clock = Instant::now();
-            let solve = contact::Settings {
-                energy_target: Some(goal),
-                sigma: needs_sigma(problem, settings),
-                ..settings.solve
-            };
-            let start = Start::again(&self.solution);
-            let mut better = contact::solve_in(&self.discrete, &solve, Some(&start), workspace)?;
-            better.info.iterations += self.solution.info.iterations;
-            self.solution = better;
+            self.solve_on(context, goal, workspace)?;
             self.record.seconds_solve += clock.elapsed().as_secs_f64();
             let clock = Instant::now();
             self.estimates = Estimates::of(
@@ -260,11 +259,50 @@ impl Level {
         Ok(())
     }
 
-    /// Makes the certificate that was left out, for a level that may be the last or whose goal is near.
-    pub(crate) fn certify(&mut self, context: Context<'_>) -> Result<(), LevelError> {
+    /// Continues the solution to an algebraic error of `goal`.
+    fn solve_on(
+        &mut self,
+        context: Context<'_>,
+        goal: f64,
+        workspace: &mut Workspace,
+    ) -> Result<(), LevelError> {
+        let solve = contact::Settings {
+            energy_target: Some(goal),
+            sigma: needs_sigma(context.problem, context.settings),
+            ..context.settings.solve
+        };
+        let start = Start::again(&self.solution);
+        let mut better = contact::solve_in(&self.discrete, &solve, Some(&start), workspace)?;
+        better.info.iterations += self.solution.info.iterations;
+        self.solution = better;
+        Ok(())
+    }
+
+    /// Makes the certificate that was left out, for a level that may be the last or whose goal is near, after the steps that bring its
+    /// algebraic part down to where it is settled as far as that can be foreseen.
+    pub(crate) fn certify(
+        &mut self,
+        context: Context<'_>,
+        forecast: Forecast,
+        workspace: &mut Workspace,
+    ) -> Result<(), LevelError> {
         let Context {
             problem, settings, ..
         } = context;
+        let clock = Instant::now();
+        let leak = |leak: f64| leak * (self.mesh.vertex_count() as f64).sqrt();
+        let share = |size: f64| 0.5 * SETTLED * size;
+        let goal = (self.estimates.error_size.map(share))
+            .zip(forecast.leak.map(leak))
+            .map(|(share, leak)| share / leak);
+        let info = &self.solution.info;
+        if let (Some(goal), Some(algebraic)) = (goal, info.algebraic_error)
+            && settings.solve.tolerance == Tolerance::Balanced
+            && algebraic > goal
+        {
+            self.solve_on(context, goal, workspace)?;
+        }
+        self.record.seconds_solve += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         self.moments = Some(moments(problem, &self.discrete)?);
         self.forecast = None;

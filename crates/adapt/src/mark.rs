@@ -24,6 +24,9 @@ pub fn mark(squares: &[f64], settings: &Mark) -> Vec<TriangleId> {
     if marked.is_empty() { all() } else { marked }
 }
 
+/// Squares that differ by no more than this part are equal: more than rounding ever leaves between equal indicators of a solution that is exact.
+const TIES: f64 = 1e-8;
+
 /// Buckets of the histogram of positive numbers: all exponents, and eight steps in each.
 const BUCKETS: usize = 1 << 14;
 
@@ -35,8 +38,9 @@ fn bucket(square: f64) -> usize {
 
 /// A set of least cardinality whose squared indicators sum to at least `theta` times the total, in linear time.
 ///
-/// A histogram tells the size of the smallest indicator in the set to a step of it; everything above is in the set, and what of that step belongs to it is
-/// found by [`largest`]. Ties go to the lower number, so the set is unique.
+/// A histogram tells the size of the smallest indicator in the set to a step of it, and [`smallest_of_largest`] searches that step. What ties with the
+/// smallest one, to [`TIES`], is in the set too: on a symmetric problem rounding would choose among them otherwise, and the meshes of one
+/// version, compiler or machine would not be those of another.
 fn doerfler(squares: &[f64], theta: f64) -> Vec<TriangleId> {
     let mut histogram = vec![(0.0f64, 0usize); BUCKETS];
     for &square in squares.iter().filter(|s| **s > 0.0) {
@@ -46,7 +50,7 @@ fn doerfler(squares: &[f64], theta: f64) -> Vec<TriangleId> {
     }
     let mut missing = theta * histogram.iter().map(|b| b.0).sum::<f64>();
     // Everything above `step` is in the set and `missing` still lacks.
-    let (mut step, mut above) = (BUCKETS, 0);
+    let mut step = BUCKETS;
     while step > 0 {
         step -= 1;
         let (sum, count) = histogram[step];
@@ -55,32 +59,24 @@ fn doerfler(squares: &[f64], theta: f64) -> Vec<TriangleId> {
         }
         if step > 0 {
             missing -= sum;
-            above += count;
         }
     }
     let numbers = || (0..squares.len() as u32).zip(squares);
     let within = |square: f64| square > 0.0 && bucket(square) == step;
     let candidates = numbers().filter(|(_, s)| within(**s)).map(|(t, _)| t);
-    let last = largest(squares, candidates.collect(), missing);
-    let mut marked = Vec::with_capacity(above + last.len());
-    let mut last = last.into_iter().peekable();
-    for (t, &square) in numbers() {
-        let in_last = last.peek() == Some(&t);
-        if in_last {
-            last.next();
-        }
-        if in_last || (square > 0.0 && bucket(square) > step) {
-            marked.push(TriangleId(t));
-        }
-    }
-    marked
+    let smallest = smallest_of_largest(squares, candidates.collect(), missing);
+    let limit = (1.0 - TIES) * smallest;
+    numbers()
+        .filter(|(_, s)| **s > 0.0 && **s >= limit)
+        .map(|(t, _)| TriangleId(t))
+        .collect()
 }
 
-/// The fewest of the triangles in `order` whose squares sum to `missing`, or all if they do not; increasing.
+/// The smallest square among the fewest of the triangles in `order` whose squares sum to `missing`, or among all if they do not; 0 of none.
 ///
 /// They are found by repeated partition about the median, of which only one half is followed (Pfeiler, Praetorius, "Doerfler marking with minimal
 /// cardinality is a linear complexity problem", 2020).
-fn largest(squares: &[f64], mut order: Vec<u32>, mut missing: f64) -> Vec<u32> {
+fn smallest_of_largest(squares: &[f64], mut order: Vec<u32>, mut missing: f64) -> f64 {
     let (mut low, mut high) = (0, order.len());
     // Everything before `low` is in the set and `missing` still lacks; nothing from `high` on is needed.
     while high - low > 1 {
@@ -101,9 +97,11 @@ fn largest(squares: &[f64], mut order: Vec<u32>, mut missing: f64) -> Vec<u32> {
             low = middle;
         }
     }
-    order.truncate(high);
-    order.sort_unstable();
-    order
+    order[..high]
+        .iter()
+        .map(|&t| squares[t as usize])
+        .reduce(f64::min)
+        .unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -123,7 +121,7 @@ mod tests {
         marked.into_iter().map(|t| t.0).collect()
     }
 
-    /// The definition: sort, take the largest until the sum is reached.
+    /// The definition: sort, take the largest until the sum is reached, and what ties with the last.
     fn by_sorting(squares: &[f64], theta: f64) -> Vec<u32> {
         let mut order: Vec<u32> = (0..squares.len() as u32).collect();
         order.sort_by(|&s, &t| {
@@ -134,10 +132,14 @@ mod tests {
         let target = theta * squares.iter().sum::<f64>();
         let (mut sum, mut set) = (0.0, Vec::new());
         for t in order {
-            if sum >= target {
+            let square = squares[t as usize];
+            let tie = set
+                .last()
+                .is_some_and(|&last: &u32| square == squares[last as usize]);
+            if square == 0.0 || (sum >= target && !tie) {
                 break;
             }
-            sum += squares[t as usize];
+            sum += square;
             set.push(t);
         }
         set.sort_unstable();
@@ -186,6 +188,18 @@ mod tests {
         }
         let all = numbers(mark(&squares, &settings(Strategy::Doerfler, 1.0)));
         assert_eq!(all.len(), squares.iter().filter(|s| **s > 0.0).count());
+    }
+
+    #[test]
+    fn rounding_does_not_choose_among_ties() {
+        // Of four equal indicators two would do.
+        let squares = [1.0, 0.25, 1.0 + 1e-15, 1.0 - 1e-15, 0.1, 1.0, 1.0 - 1e-6];
+        let marked = numbers(mark(&squares, &settings(Strategy::Doerfler, 0.3)));
+        assert_eq!(marked, [0, 2, 3, 5]);
+        assert_eq!(
+            numbers(mark(&[0.0, 2.0], &settings(Strategy::Doerfler, 1.0))),
+            [1]
+        );
     }
 
     #[test]

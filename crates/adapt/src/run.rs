@@ -39,8 +39,14 @@ pub fn run(
     let mut forecast = Forecast::default();
     loop {
         let number = level.number;
-        let reason =
-            finish(&mut level, context, &mut workspace, &mut sharpness).map_err(failed(number))?;
+        let reason = finish(
+            &mut level,
+            context,
+            forecast,
+            &mut workspace,
+            &mut sharpness,
+        )
+        .map_err(failed(number))?;
         forecast.see(&level);
         if settings.output.wants_fields(number, reason.is_some()) {
             level
@@ -76,6 +82,7 @@ pub fn run(
 fn finish(
     level: &mut Level,
     context: Context<'_>,
+    forecast: Forecast,
     workspace: &mut Workspace,
     sharpness: &mut f64,
 ) -> Result<Option<Reason>, LevelError> {
@@ -91,7 +98,7 @@ fn finish(
         if reason(level, NEAR * factor * level.estimates.reachable).is_none() {
             return Ok(None);
         }
-        level.certify(context)?;
+        level.certify(context, forecast, workspace)?;
     }
     if reason(level, factor * level.estimates.reachable).is_none() {
         return Ok(None);
@@ -213,7 +220,7 @@ const ROUNDING_SHARE: f64 = 1e-12;
 const SHARPNESS: f64 = 0.9;
 
 /// A predicted bound times this is taken to be the least that the certificate may come out as.
-const NEAR: f64 = 0.9;
+const NEAR: f64 = 0.96;
 
 /// The first rule that would hold on a level with this bound.
 fn reached(settings: &Settings, level: &Level, scale: Scale, bound: f64) -> Option<Reason> {
