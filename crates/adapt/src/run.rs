@@ -60,6 +60,7 @@ pub fn run(
             return Ok(Outcome { reason, level });
         }
         let marked = mark(&level.estimates.marking, &settings.mark); // MARK
+        level.estimates.marking = Vec::new();
         level = match level.refine(&marked, context, forecast, &mut workspace) {
             // REFINE, SOLVE, ESTIMATE
             Ok(next) => next,

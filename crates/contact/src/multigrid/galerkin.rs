@@ -42,6 +42,15 @@ impl<U: Unknowns> Levels<U> {
         self.initial.fit(hierarchy);
     }
 
+    /// Gives up all memory but that of the initial mesh and the spare vectors.
+    pub fn forget(&mut self) {
+        *self = Levels {
+            initial: std::mem::take(&mut self.initial),
+            spare: std::mem::take(&mut self.spare),
+            ..Levels::default()
+        };
+    }
+
     /// A vector of some length from the spare ones; its values are whatever they were.
     pub fn vector(&mut self, len: usize) -> Vec<U::Value> {
         let mut vector = self.spare.pop().unwrap_or_default();

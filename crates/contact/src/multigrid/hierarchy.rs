@@ -47,8 +47,6 @@ pub(crate) struct Hierarchy {
     pub old_slot: Vec<u32>,
     /// The edges of every rank in the mesh itself.
     pub rows: Rows,
-    /// Scratch: the level in which a vertex was listed as old last.
-    listed: Vec<u16>,
 }
 
 /// The rows of the mesh T_l while it grows: other end and slot of every edge.
@@ -87,9 +85,21 @@ impl Rows {
         &mut self.entry[self.start[x as usize] as usize..self.end[x as usize] as usize]
     }
 
-    /// The edges of a rank: other end and slot.
+    /// All edges are there: every row ends where the next begins.
+    fn complete(&mut self) {
+        self.start.push(self.entry.len() as u32);
+        self.end = Vec::new();
+    }
+
+    /// The edges of a rank: other end and slot. Complete rows only.
     #[inline]
     pub fn row(&self, x: u32) -> &[[u32; 2]] {
+        &self.entry[self.start[x as usize] as usize..self.start[x as usize + 1] as usize]
+    }
+
+    /// The edges of a rank as far as they are there.
+    #[inline]
+    fn present(&self, x: u32) -> &[[u32; 2]] {
         &self.entry[self.start[x as usize] as usize..self.end[x as usize] as usize]
     }
 
@@ -247,8 +257,8 @@ impl Hierarchy {
                 rows.push(y, x as u32, slot);
             }
         }
-        let mut listed = std::mem::take(&mut self.listed);
-        refill(&mut listed, self.len(), 0);
+        // The level in which a vertex was listed as old last.
+        let mut listed = vec![0u16; self.len()];
         for level in 1..=self.depth() {
             for p in self.ranks(level) {
                 let quad = self.quad[p - n0];
@@ -282,7 +292,7 @@ impl Hierarchy {
                     }
                     *seen = level as u16;
                     self.old_vertex.push(*q);
-                    for &[other, slot] in rows.row(*q) {
+                    for &[other, slot] in rows.present(*q) {
                         if slot != nowhere {
                             self.old_column.push(other);
                             self.old_slot.push(slot);
@@ -293,8 +303,16 @@ impl Hierarchy {
             }
             self.old_level.push(self.old_vertex.len() as u32);
         }
+        rows.complete();
+        for grown in [
+            &mut self.old_vertex,
+            &mut self.old_start,
+            &mut self.old_column,
+            &mut self.old_slot,
+        ] {
+            grown.shrink_to_fit();
+        }
         self.rows = rows;
-        self.listed = listed;
     }
 
     /// Numbers the vertices by level, within a level along the leaves; the number of edges of every vertex of the mesh.

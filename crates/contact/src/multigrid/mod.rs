@@ -113,6 +113,14 @@ fn along_leaves(mesh: &Mesh) -> Vec<u32> {
 }
 
 impl<U: Unknowns> Store<U> {
+    /// Gives up what every solve writes anew: the estimators want the memory next.
+    fn rest(&mut self) {
+        self.levels.forget();
+        self.levels.spare.clear();
+        self.beside.forget();
+        self.beside.spare.clear();
+    }
+
     /// Assembles a matrix, unless it is there.
     fn hold(
         &mut self,
@@ -121,10 +129,13 @@ impl<U: Unknowns> Store<U> {
         mesh: &Mesh,
         coefficient: impl Fn(usize, usize) -> f64,
     ) {
-        if self.held != Some(role) {
+        let other = self.held != Some(role);
+        if other {
             self.finest.assemble(hierarchy, mesh, coefficient);
-            self.levels.fit(hierarchy);
             self.held = Some(role);
+        }
+        if other || self.levels.pivot.is_empty() {
+            self.levels.fit(hierarchy);
         }
     }
 }
@@ -154,11 +165,13 @@ pub(crate) fn solve(
         hierarchy,
     };
     let reduced = Proportional::of(problem).filter(|_| settings.reduce);
-    match reduced {
+    let solution = match reduced {
         Some(model) => run.reduced(&model, scalar),
         None => run.pair(pair, scalar),
-    }
-    .map(Some)
+    };
+    scalar.rest();
+    pair.rest();
+    solution.map(Some)
 }
 
 /// K sigma = z for given forces, where there is a hierarchy and the method converges.
@@ -251,6 +264,9 @@ impl Run<'_> {
             let gap = self.gap(model, finest, levels, gap_goal, size)?;
             (mean, gap)
         };
+
+        levels.forget();
+        beside.forget();
 
         // The pull on a closed gap becomes the force, where it is more than rounding.
         let n = hierarchy.len();
@@ -375,6 +391,7 @@ impl Run<'_> {
             f.min(g)
         };
         let both = self.descend(finest, levels, Some(&scale), vectors, goal)?;
+        levels.forget();
         let mut force = vec![0.0; hierarchy.len()];
         for p in (0..force.len()).filter(|&p| both.contact[p] && !hierarchy.fixed[p]) {
             let [d1, d2] = finest.diagonal[p];
