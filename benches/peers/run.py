@@ -214,6 +214,43 @@ def table(results, absent, here, target):
     return "\n".join(lines)
 
 
+def report(ours, here, absent, best, before, bandwidth, rounds, options):
+    """The table of what is known so far, printed and written to the page; every line to results.json."""
+    results = []
+    names = {"program": "membranes", "refinement": "bisection", "solver": "multigrid", "source": ours.scene}
+    absent = absent + [p for index, p in enumerate(here, 1) if index not in best]
+    for index, described in enumerate([names, *here]):
+        if index not in best:
+            continue
+        result = best[index] | {k: described[k] for k in ("program", "refinement", "solver")}
+        result["lines"] = count_lines(described["source"])
+        ends = [dict(level) for level in result["levels"][-2:]]
+        if index == 0:
+            ends[0]["cpu"], ends[1]["cpu"] = before, result["cpu"]
+        for key in ("vertices", "cpu"):
+            result["exact_" + key] = interpolate(ends, options.target, key)
+        results.append(result)
+
+    rates = [f"{rate:.1f}" for rate in bandwidth if rate]
+    versions = sorted({f"{name} {version}" for r in results for name, version in r.get("versions", {}).items()})
+    text = "\n".join(
+        [
+            f"Machine: {processor()}, {os.cpu_count()} cores; triad on one core, before and after: {' and '.join(rates) or 'not measured'} GB/s."
+            f" {ours.version}; {', '.join(versions)}. Best of {rounds}.",
+            "",
+            table(results, absent, here, options.target),
+        ]
+    )
+    (SCRATCH / "results.json").write_text(
+        json.dumps({"target": options.target, "triad": bandwidth, "results": results}, indent=1)
+    )
+    print(text)
+    if options.page.exists():
+        page = options.page.read_text()
+        marked = re.compile(r"(<!-- made by benches/peers/run.py -->\n).*?(<!-- end -->)", re.S)
+        options.page.write_text(marked.sub(lambda m: f"{m[1]}\n{text}\n\n{m[2]}", page))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--target", type=float, default=0.005, help="true H1 error of both membranes to reach")
@@ -252,42 +289,8 @@ def main():
             print(f"round {round_ + 1}: {pathlib.Path(name).name}: {result['cpu']:.2f} s CPU", flush=True)
             if index not in best or result["cpu"] < best[index]["cpu"]:
                 best[index] = result
-    bandwidth.append(triad())
+        report(ours, here, absent, best, before, [*bandwidth, triad()], round_ + 1, options)
     shutil.rmtree(ours.folder)
-
-    results = []
-    names = {"program": "membranes", "refinement": "bisection", "solver": "multigrid", "source": ours.scene}
-    absent += [p for index, p in enumerate(here, 1) if index not in best]
-    for index, described in enumerate([names, *here]):
-        if index not in best:
-            continue
-        result = best[index] | {k: described[k] for k in ("program", "refinement", "solver")}
-        result["lines"] = count_lines(described["source"])
-        ends = [dict(level) for level in result["levels"][-2:]]
-        if index == 0:
-            ends[0]["cpu"], ends[1]["cpu"] = before, result["cpu"]
-        for key in ("vertices", "cpu"):
-            result["exact_" + key] = interpolate(ends, options.target, key)
-        results.append(result)
-
-    rates = [f"{rate:.1f}" for rate in bandwidth if rate]
-    versions = sorted({f"{name} {version}" for r in results for name, version in r.get("versions", {}).items()})
-    text = "\n".join(
-        [
-            f"Machine: {processor()}, {os.cpu_count()} cores; triad on one core, before and after: {' and '.join(rates) or 'not measured'} GB/s."
-            f" {ours.version}; {', '.join(versions)}. Best of {options.repeat}.",
-            "",
-            table(results, absent, here, options.target),
-        ]
-    )
-    (SCRATCH / "results.json").write_text(
-        json.dumps({"target": options.target, "triad": bandwidth, "results": results}, indent=1)
-    )
-    print(text)
-    if options.page.exists():
-        page = options.page.read_text()
-        marked = re.compile(r"(<!-- made by benches/peers/run.py -->\n).*?(<!-- end -->)", re.S)
-        options.page.write_text(marked.sub(lambda m: f"{m[1]}\n{text}\n\n{m[2]}", page))
 
 
 if __name__ == "__main__":
