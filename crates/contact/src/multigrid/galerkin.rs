@@ -125,11 +125,20 @@ impl<U: Unknowns> Levels<U> {
                 U::truncated_pivot(finest.diagonal[p], glued(p))
             };
         }
-        for (p, quad) in hierarchy.quad.iter().enumerate() {
-            let row = glued(n0 + p);
-            for k in 0..4 {
-                let s = 4 * p + k;
-                self.coupling[s] = U::truncated(finest.slot[s], row, glued(quad[k] as usize));
+        let slots = finest.slot.chunks_exact(4);
+        let couplings = self.coupling.chunks_exact_mut(4).zip(slots);
+        if free {
+            for (to, from) in couplings.take(hierarchy.quad.len()) {
+                for k in 0..4 {
+                    to[k] = U::truncated(from[k], None, None);
+                }
+            }
+        } else {
+            for ((p, quad), (to, from)) in hierarchy.quad.iter().enumerate().zip(couplings) {
+                let row = glued(n0 + p);
+                for k in 0..4 {
+                    to[k] = U::truncated(from[k], row, glued(quad[k] as usize));
+                }
             }
         }
         let edges = 4 * hierarchy.quad.len();

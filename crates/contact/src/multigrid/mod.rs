@@ -43,6 +43,10 @@ const KKT: f64 = 1e-10;
 /// The inequality is solved to this part of a prescribed KKT residual: the mean takes the rest.
 const SHARE: f64 = 0.9;
 
+/// A pull so many times what the largest gap and the diagonal make of its row's rounding is a force without a closer look: a row of a mesh with
+/// ordinary shapes has magnitudes of twice its diagonal.
+const FAR: f64 = 64.0;
+
 /// With a contraction beyond this every level takes steps enough to see how far it has come.
 const SLOW: f64 = 0.25;
 
@@ -270,13 +274,16 @@ impl Run<'_> {
 
         // The pull on a closed gap becomes the force, where it is more than rounding.
         let n = hierarchy.len();
+        let largest = gap.x.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let mut force = gap.r;
         for p in 0..n {
             let r = force[p];
             let held = gap.contact[p] && !hierarchy.fixed[p] && r < 0.0;
             force[p] = if held && {
                 let scale = model.gap_load(hierarchy.vertex[p] as usize).1;
-                -r > ROW_ROUNDING * (scale + row_magnitude(hierarchy, finest, &gap.x, p)[0])
+                // Nearly all are far above what the largest gap could leave in their row.
+                -r > FAR * ROW_ROUNDING * (scale + finest.diagonal[p] * largest)
+                    || -r > ROW_ROUNDING * (scale + row_magnitude(hierarchy, finest, &gap.x, p)[0])
             } {
                 model.force(-r)
             } else {
