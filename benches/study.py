@@ -138,7 +138,7 @@ def section(table, repeat):
         out.append(f"| {choice[0]} | {choice[1]} | " + " | ".join(cells) + f" | {means[choice]:.2f} |")
     winner = min(means, key=means.get)
     scenes = "; ".join(f"{name}: {what}" for name, what in SCENES.items())
-    out.append(f"\n{scenes}. The mean is the geometric one over the columns. ")
+    out.append(f"\n{scenes}. The mean is the geometric one over the columns.")
     out.append(
         f"The best choice over all is `children = {winner[0]}`, `theta = {winner[1]}` with {means[winner]:.2f}; "
         f"the default, `children = {DEFAULT[0]}`, `theta = {DEFAULT[1]}`, has {means[DEFAULT]:.2f}."
