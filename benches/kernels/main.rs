@@ -65,7 +65,7 @@ pub fn best(repeat: usize, mut work: impl FnMut() -> f64) -> f64 {
 
 fn times(kernels: &[&Kernel]) {
     println!("one thread, the best of several; other programs on the machine disturb\n");
-    let triad = limits::print();
+    let triad = limits::print().triad;
     println!(
         "\n{:<28} {:>10} {:>14}  unit",
         "kernel", "ns/unit", "bytes at triad"

@@ -2,6 +2,7 @@
 
 mod command_line;
 mod configs;
+mod growth;
 mod run;
 mod verify;
 mod vtk;
