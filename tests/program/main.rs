@@ -3,5 +3,6 @@
 mod command_line;
 mod configs;
 mod run;
+mod threads;
 mod verify;
 mod vtk;
