@@ -257,7 +257,7 @@ fn certificate_marks_like_the_true_error() {
             let mut start = None;
             loop {
                 let mesh = std::sync::Arc::new(problem.mesh.clone());
-                let discrete = adapt::discretise(&problem, &mesh).expect("good data");
+                let discrete = adapt::discretise(&problem, &mesh, 1).expect("good data");
                 let moments = adapt::moments(&problem, &discrete).expect("good data");
                 let settings = SolveSettings::default();
                 let solution =

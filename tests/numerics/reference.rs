@@ -54,7 +54,7 @@ impl Reference {
     pub fn discrete(&self) -> DiscreteProblem {
         let (problem, scale) = (&self.problem, self.problem.scale);
         let mut discrete =
-            discretise(problem, &std::sync::Arc::new(problem.mesh.clone())).expect("good data");
+            discretise(problem, &std::sync::Arc::new(problem.mesh.clone()), 1).expect("good data");
         for (i, k) in [(0, "1"), (1, "2")] {
             let scaled = |key: String, e: i32| -> Vec<f64> {
                 self.array(&key)

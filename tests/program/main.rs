@@ -4,5 +4,6 @@ mod command_line;
 mod configs;
 mod growth;
 mod run;
+mod threads;
 mod verify;
 mod vtk;

@@ -52,13 +52,17 @@ pub struct Before<'a> {
     pub parent: &'a [TriangleId],
 }
 
-/// Integrates the data on a mesh.
+/// Integrates the data on a mesh, on at most `threads` threads, whose number does not show.
 ///
 /// # Errors
 /// [`DataError`] where data are not finite, a tension is not positive, or g1 < g2.
-pub fn discretise(problem: &Problem, mesh: &Arc<Mesh>) -> Result<DiscreteProblem, DataError> {
+pub fn discretise(
+    problem: &Problem,
+    mesh: &Arc<Mesh>,
+    threads: usize,
+) -> Result<DiscreteProblem, DataError> {
     let load = [&*problem.load[0], &*problem.load[1]];
-    let loads = || load_pair_relative_to(&Reference::of(&problem.mesh, load)?, mesh, load);
+    let loads = || load_pair_relative_to(&Reference::of(&problem.mesh, load)?, mesh, load, threads);
     assemble(problem, mesh, None, loads)
 }
 
@@ -70,9 +74,10 @@ pub fn discretise_carried(
     problem: &Problem,
     mesh: &Arc<Mesh>,
     before: Before<'_>,
+    threads: usize,
 ) -> Result<DiscreteProblem, DataError> {
     let load = [&*problem.load[0], &*problem.load[1]];
-    let loads = || load_pair_carried(mesh, load, &before.discrete.loads, before.parent);
+    let loads = || load_pair_carried(mesh, load, &before.discrete.loads, before.parent, threads);
     assemble(problem, mesh, Some(before), loads)
 }
 

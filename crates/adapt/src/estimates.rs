@@ -70,6 +70,7 @@ impl Estimates {
             discrete,
             solution,
             drives || wants(Estimator::Residual),
+            settings.solve.threads,
         );
         let oscillation = sweep.oscillation;
         let global_bound = paper.as_ref().map(|paper| {

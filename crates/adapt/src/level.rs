@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use contact::{DiscreteProblem, Solution, Start, Tolerance, Workspace};
 use estimate::{Grade, Moments};
-use fem_core::{Mesh, TriangleId};
+use fem_core::{Mesh, TriangleId, parallel};
 
 use crate::discretise::{Before, DataError, discretise, discretise_carried, moments};
 use crate::estimates::Estimates;
@@ -113,7 +113,8 @@ impl Level {
         workspace: &mut Workspace,
     ) -> Result<Level, LevelError> {
         let mesh = Arc::new(context.problem.mesh.clone());
-        let discrete = |mesh: &Arc<Mesh>| discretise(context.problem, mesh);
+        let discrete =
+            |mesh: &Arc<Mesh>| discretise(context.problem, mesh, context.settings.solve.threads);
         Level::on(mesh, context, discrete, Begin::default(), workspace)
     }
 
@@ -131,7 +132,9 @@ impl Level {
             Strategy::Uniform => Children::Four,
             _ => settings.mark.children,
         };
-        let (mesh, refinement) = self.mesh.refined(marked, children)?;
+        let (mesh, refinement) = self
+            .mesh
+            .refined_on(marked, children, settings.solve.threads)?;
         let carried = Start::prolong(&self.solution, &mesh, refinement.old_vertices);
         // First-order elements: the error goes like the root of the number of vertices at best.
         let growth = self.mesh.vertex_count() as f64 / mesh.vertex_count() as f64;
@@ -147,7 +150,9 @@ impl Level {
             discrete: &self.discrete,
             parent: &refinement.parent,
         };
-        let discrete = |mesh: &Arc<Mesh>| discretise_carried(context.problem, mesh, before);
+        let discrete = |mesh: &Arc<Mesh>| {
+            discretise_carried(context.problem, mesh, before, settings.solve.threads)
+        };
         Level::on(Arc::new(mesh), context, discrete, begin, workspace)
     }
 
@@ -170,7 +175,8 @@ impl Level {
             Ok::<_, DataError>((discrete, moments))
         };
         let (discrete, moments) = if settings.solve.threads > 1 {
-            beside(|| workspace.read(&mesh, &settings.solve), assemble).1?
+            let threads = settings.solve.threads;
+            parallel::both(threads, || workspace.read(&mesh, &settings.solve), assemble).1?
         } else {
             assemble()?
         };
@@ -422,19 +428,6 @@ impl Level {
         self.record.seconds_total = context.begun.elapsed().as_secs_f64();
         self.record.peak_memory_mb = peak_memory_mb();
     }
-}
-
-/// Does two things side by side.
-fn beside<A: Send, B>(first: impl FnOnce() -> A + Send, second: impl FnOnce() -> B) -> (A, B) {
-    std::thread::scope(|scope| {
-        let first = scope.spawn(first);
-        let second = second();
-        let first = first.join();
-        (
-            first.unwrap_or_else(|e| std::panic::resume_unwind(e)),
-            second,
-        )
-    })
 }
 
 /// Whether an estimate of every level needs sigma.

@@ -1,11 +1,15 @@
 //! One pass over the triangles for everything cheap that a level is judged by.
 //!
 //! The [residual estimator](mod@crate::residual), the [oscillation](mod@crate::oscillation), the [energy](mod@crate::energy) and the largest contribution of the
-//! loads need areas, gradients and diameters of all triangles. They are found once here, in the order of the mesh; a jump over an edge is added
-//! when the later one of its triangles is met, which has the normal at hand and finds the flux of the other one stored.
+//! loads need areas, gradients and diameters of all triangles. They are found once here, in the order of the mesh and by blocks that
+//! [threads](fem_core::parallel) share; a jump over an edge is added when the later one of its triangles is met, which has the normal at hand and finds the flux
+//! of the other one stored. The few edges between two blocks are handled on both sides.
+
+use std::ops::Range;
 
 use contact::{DiscreteProblem, Solution};
 use fem_core::integrate::Loads;
+use fem_core::parallel::{self, BLOCK};
 use fem_core::{ElementValues, Mesh};
 
 use crate::action::nodal_action;
@@ -128,75 +132,190 @@ impl Data for &DiscreteProblem {
     }
 }
 
-/// Passes over all triangles; the residual estimator is computed if it is wanted.
-pub fn sweep(mesh: &Mesh, problem: &DiscreteProblem, solution: &Solution, residual: bool) -> Sweep {
+/// Passes over all triangles on at most `threads` threads, whose number does not show; the residual estimator is computed if it is wanted.
+pub fn sweep(
+    mesh: &Mesh,
+    problem: &DiscreteProblem,
+    solution: &Solution,
+    residual: bool,
+    threads: usize,
+) -> Sweep {
+    let level = (mesh, problem, solution, threads);
     match (Constants::of(problem), residual) {
-        (Some(data), true) => pass::<true, _>(mesh, problem, solution, &data),
-        (Some(data), false) => pass::<false, _>(mesh, problem, solution, &data),
-        (None, true) => pass::<true, _>(mesh, problem, solution, &problem),
-        (None, false) => pass::<false, _>(mesh, problem, solution, &problem),
+        (Some(data), true) => pass::<true, _>(level, &data),
+        (Some(data), false) => pass::<false, _>(level, &data),
+        (None, true) => pass::<true, _>(level, &problem),
+        (None, false) => pass::<false, _>(level, &problem),
     }
 }
 
 /// The pass; `RESIDUAL` says whether the estimator is computed.
-fn pass<const RESIDUAL: bool, D: Data>(
-    mesh: &Mesh,
-    problem: &DiscreteProblem,
-    solution: &Solution,
+fn pass<const RESIDUAL: bool, D: Data + Sync>(
+    (mesh, problem, solution, threads): (&Mesh, &DiscreteProblem, &Solution, usize),
     data: &D,
 ) -> Sweep {
     let (corners, work) = corners::<RESIDUAL>(mesh, problem, solution);
-    let corners = &corners[..];
     let count = mesh.triangle_count();
-    let room = if RESIDUAL { count } else { 0 };
+    let threads = parallel::worthwhile(threads, count);
     let varying = D::VARYING && problem.loads.iter().any(|f| f.same().is_none());
-    let mut squares: Vec<f64> = Vec::with_capacity(room);
-    let mut fluxes: Vec<[[f64; 2]; 2]> = Vec::with_capacity(room);
-    let mut oscillation = Vec::with_capacity(if varying { count } else { 0 });
-    let mut weighted_oscillation = Vec::with_capacity(oscillation.capacity());
+    let mut squares = vec![0.0; if RESIDUAL { count } else { 0 }];
+    let room = if varying { count } else { 0 };
+    let mut oscillation = [vec![0.0; room], vec![0.0; room]];
+    let blocks = Blocks {
+        mesh,
+        problem,
+        data,
+        corners: &corners,
+        varying,
+    };
+    let mut chunks = squares.chunks_mut(BLOCK);
+    let mut oscillations = oscillation.each_mut().map(|o| o.chunks_mut(BLOCK));
+    let jobs: Vec<_> = parallel::blocks(count)
+        .map(|block| {
+            let oscillation = oscillations.each_mut();
+            let into = Written {
+                squares: chunks.next().unwrap_or_default(),
+                oscillation: oscillation.map(|o| o.next().unwrap_or_default()),
+            };
+            (block, into)
+        })
+        .collect();
+    let sums = parallel::map(threads, jobs, |(block, into)| {
+        blocks.pass::<RESIDUAL>(block, into)
+    });
     let (mut energy, mut largest, mut weighted_largest) = (0.0, 0.0, 0.0);
-    for (t, (v, around)) in mesh.triangles().iter().zip(mesh.neighbours()).enumerate() {
-        let [a, b, c] = v.map(|j| &corners[j.index()]);
-        // Edge k is opposite to corner k; all run counter-clockwise.
+    for sums in sums {
+        energy += sums.energy;
+        largest = larger(largest, sums.largest);
+        weighted_largest = larger(weighted_largest, sums.weighted_largest);
+    }
+    let [oscillation, weighted_oscillation] =
+        oscillation.map(|squares| varying.then(|| Squares::new(squares)));
+    Sweep {
+        residual: RESIDUAL.then(|| Squares::new(squares)),
+        oscillation,
+        weighted_oscillation,
+        energy: Energy {
+            energy: 0.5 * energy - work,
+            energy_norm: energy.sqrt(),
+        },
+        largest_contribution: largest.sqrt(),
+        weighted_contribution: weighted_largest.sqrt(),
+    }
+}
+
+/// What all blocks read.
+struct Blocks<'a, D> {
+    mesh: &'a Mesh,
+    problem: &'a DiscreteProblem,
+    data: &'a D,
+    corners: &'a [Corner],
+    /// Whether a load deviates from its means.
+    varying: bool,
+}
+
+/// What a block writes; empty where it is not wanted.
+struct Written<'a> {
+    squares: &'a mut [f64],
+    /// The oscillation by itself and in the unit of the energy norm.
+    oscillation: [&'a mut [f64]; 2],
+}
+
+/// What a block adds to the numbers of the level.
+#[derive(Default)]
+struct Sums {
+    energy: f64,
+    largest: f64,
+    weighted_largest: f64,
+}
+
+/// A triangle as the pass sees it.
+struct Element {
+    area: f64,
+    /// Edge k is opposite to corner k; all run counter-clockwise.
+    edges: [[f64; 2]; 3],
+    flux: [[f64; 2]; 2],
+    /// int_K mu_i |grad u_i|^2.
+    energy: [f64; 2],
+}
+
+impl<D: Data> Blocks<'_, D> {
+    #[inline(always)]
+    fn element(&self, t: usize, [a, b, c]: [&Corner; 3]) -> Element {
         let edge = |p: &Corner, q: &Corner| [q.point[0] - p.point[0], q.point[1] - p.point[1]];
         let edges = [edge(b, c), edge(c, a), edge(a, b)];
         let twice = edges[2][1] * edges[1][0] - edges[2][0] * edges[1][1];
         let area = 0.5 * twice;
-        let [l0, l1, l2] = edges.map(|e| e[0] * e[0] + e[1] * e[1]);
-        let h2 = larger(larger(l0, l1), l2);
         let over = 1.0 / twice;
-        let means = [data.mean(0, t), data.mean(1, t)];
-        let softness = [data.softness(0, t), data.softness(1, t)];
         let mut flux = [[0.0; 2]; 2];
+        let mut energy = [0.0; 2];
         for i in 0..2 {
             // Differences first: a large common height must not cost digits.
             let d1 = (b.displacement[i] - a.displacement[i]) * over;
             let d2 = (c.displacement[i] - a.displacement[i]) * over;
             let x = -(d1 * edges[1][1] + d2 * edges[2][1]);
             let y = d1 * edges[1][0] + d2 * edges[2][0];
-            let mu = data.tension(i, t);
+            let mu = self.data.tension(i, t);
             flux[i] = [mu * x, mu * y];
-            energy += area * (flux[i][0] * x + flux[i][1] * y);
+            energy[i] = area * (flux[i][0] * x + flux[i][1] * y);
         }
-        let weight = h2 * area;
-        let [f, g] = means.map(|f| f * f);
-        largest = larger(largest, weight * (f + g));
-        let weighted = weight * (f * softness[0] + g * softness[1]);
-        weighted_largest = larger(weighted_largest, weighted);
-        if varying {
-            let [f, g] = [0, 1].map(|i| problem.loads[i].deviation_squared(t));
-            oscillation.push(h2 * (f + g));
-            weighted_oscillation.push(h2 * (f * softness[0] + g * softness[1]));
+        Element {
+            area,
+            edges,
+            flux,
+            energy,
         }
-        if RESIDUAL {
+    }
+
+    /// Passes over a block. An edge within it is handled when its second triangle is met; on its rim every block handles the edge for
+    /// itself, and computes the flux behind it once more.
+    fn pass<const RESIDUAL: bool>(&self, block: Range<usize>, into: Written<'_>) -> Sums {
+        let Written {
+            squares,
+            oscillation: [oscillation, weighted_oscillation],
+        } = into;
+        let (problem, data) = (self.problem, self.data);
+        let (triangles, neighbours) = (self.mesh.triangles(), self.mesh.neighbours());
+        let begin = block.start;
+        let own = triangles[block.clone()]
+            .iter()
+            .zip(&neighbours[block.clone()]);
+        let corners = |t: usize| triangles[t].map(|j| &self.corners[j.index()]);
+        let mut fluxes: Vec<[[f64; 2]; 2]> = Vec::with_capacity(block.len());
+        let mut sums = Sums::default();
+        for (k, (v, around)) in own.enumerate() {
+            let t = begin + k;
+            let [a, b, c] = v.map(|j| &self.corners[j.index()]);
+            let element = self.element(t, [a, b, c]);
+            let Element {
+                area, edges, flux, ..
+            } = element;
+            element.energy.iter().for_each(|e| sums.energy += e);
+            let [l0, l1, l2] = edges.map(|e| e[0] * e[0] + e[1] * e[1]);
+            let h2 = larger(larger(l0, l1), l2);
+            let means = [data.mean(0, t), data.mean(1, t)];
+            let softness = [data.softness(0, t), data.softness(1, t)];
+            let weight = h2 * area;
+            let [f, g] = means.map(|f| f * f);
+            sums.largest = larger(sums.largest, weight * (f + g));
+            let weighted = weight * (f * softness[0] + g * softness[1]);
+            sums.weighted_largest = larger(sums.weighted_largest, weighted);
+            if self.varying {
+                let [f, g] = [0, 1].map(|i| problem.loads[i].deviation_squared(t));
+                oscillation[k] = h2 * (f + g);
+                weighted_oscillation[k] = h2 * (f * softness[0] + g * softness[1]);
+            }
+            if !RESIDUAL {
+                continue;
+            }
             let actions = [a.action, b.action, c.action];
             let mut square = 0.0;
-            let mut sums = [0.0; 2];
+            let mut terms = [0.0; 2];
             for l in actions {
-                sums[0] += (means[0] + l) * (means[0] + l);
-                sums[1] += (means[1] - l) * (means[1] - l);
+                terms[0] += (means[0] + l) * (means[0] + l);
+                terms[1] += (means[1] - l) * (means[1] - l);
             }
-            square += weight / 3.0 * (softness[0] * sums[0] + softness[1] * sums[1]);
+            square += weight / 3.0 * (softness[0] * terms[0] + softness[1] * terms[1]);
             if actions != [0.0; 3] {
                 let gap = |c: &Corner| c.displacement[0] - c.displacement[1];
                 square += contact_term(area, actions, [gap(a), gap(b), gap(c)]);
@@ -206,32 +325,29 @@ fn pass<const RESIDUAL: bool, D: Data>(
                     continue;
                 };
                 let s = other.index();
-                if s >= t {
+                // Below the block this wraps around and is far beyond it.
+                let place = s.wrapping_sub(begin);
+                let q = if place < k {
+                    fluxes[place]
+                } else if place < block.len() {
                     continue;
-                }
-                let (p, q) = (&flux, &fluxes[s]);
+                } else {
+                    self.element(s, corners(s)).flux
+                };
                 let mut half = 0.0;
                 for i in 0..2 {
-                    let jump = (q[i][0] - p[i][0]) * edge[1] - (q[i][1] - p[i][1]) * edge[0];
+                    let jump = (q[i][0] - flux[i][0]) * edge[1] - (q[i][1] - flux[i][1]) * edge[0];
                     half += 0.5 * jump * jump * data.stiffer(i, t, s);
                 }
                 square += half;
-                squares[s] += half;
+                if place < k {
+                    squares[place] += half;
+                }
             }
-            squares.push(square);
+            squares[k] = square;
             fluxes.push(flux);
         }
-    }
-    Sweep {
-        residual: RESIDUAL.then(|| Squares::new(squares)),
-        oscillation: varying.then(|| Squares::new(oscillation)),
-        weighted_oscillation: varying.then(|| Squares::new(weighted_oscillation)),
-        energy: Energy {
-            energy: 0.5 * energy - work,
-            energy_norm: energy.sqrt(),
-        },
-        largest_contribution: largest.sqrt(),
-        weighted_contribution: weighted_largest.sqrt(),
+        sums
     }
 }
 
@@ -300,7 +416,7 @@ mod tests {
         let lower = value(|x, y| x * y - 0.25 * x);
         let force = value(|x, y| if x * x + y * y < 0.6 { 0.5 - x } else { 0.0 });
         let solution = solution([upper, lower], force, value(|_, _| 0.0));
-        let found = sweep(&mesh, &problem, &solution, true);
+        let found = sweep(&mesh, &problem, &solution, true, 1);
         let agree = |found: &[f64], expected: &[f64]| {
             assert_eq!(found.len(), expected.len());
             for (a, b) in found.iter().zip(expected) {
@@ -334,11 +450,11 @@ mod tests {
         close(found.weighted_contribution, weighted.sqrt(), 1e-14);
         problem.loads = Loads::constant(&mesh, [-3.0, 2.0]);
         problem.tension_mean = [0.5, 3.0].map(ElementValues::Same);
-        let constant = sweep(&mesh, &problem, &solution, true);
+        let constant = sweep(&mesh, &problem, &solution, true, 1);
         assert_eq!(constant.oscillation, None);
         let squares = constant.residual.expect("wanted");
         agree(&squares.roots(), &residual(&mesh, &problem, &solution));
-        let without = sweep(&mesh, &problem, &solution, false);
+        let without = sweep(&mesh, &problem, &solution, false, 1);
         assert_eq!(without.residual, None);
         assert_eq!(without.energy, constant.energy);
     }

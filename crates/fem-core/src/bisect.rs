@@ -9,10 +9,12 @@
 //! The cost of a pass is linear in the number of triangles, the closure linear in what it splits. Three loops do it: one counts, one makes the
 //! vertices, one the triangles; each writes its arrays from front to back.
 
+mod children;
+
 use crate::error::MeshError;
 use crate::index::{TriangleId, VertexId};
-use crate::mesh::{Mesh, TRIANGLE_LIMIT, signed_area};
-use crate::parts::{FACES, Link, PARTS, REFINEMENT_EDGE, TOUCHING};
+use crate::mesh::{Mesh, TRIANGLE_LIMIT};
+use crate::parts::{FACES, REFINEMENT_EDGE, TOUCHING};
 use crate::topology::{Birth, Neighbour, Topology};
 
 /// How far a marked triangle is divided.
@@ -49,10 +51,23 @@ impl Mesh {
         marked: &[TriangleId],
         children: Children,
     ) -> Result<(Mesh, Refinement), MeshError> {
+        self.refined_on(marked, children, 1)
+    }
+
+    /// [`Mesh::refined`] on at most `threads` threads; the result does not depend on their number.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn refined_on(
+        &self,
+        marked: &[TriangleId],
+        children: Children,
+        threads: usize,
+    ) -> Result<(Mesh, Refinement), MeshError> {
         let (split, closure_steps) = self.closure(marked, children);
         let plan = Plan::new(&self.topology, &split)?;
         let vertices = plan.vertices(self)?;
-        let (mesh, parent) = plan.triangles(self, vertices)?;
+        let (mesh, parent) = plan.triangles(self, vertices, threads)?;
         let refinement = Refinement {
             old_vertices: self.vertex_count(),
             parent,
@@ -300,109 +315,6 @@ impl<'a> Plan<'a> {
             boundary,
             genealogy,
         })
-    }
-
-    /// Makes the triangles, and with them the refined mesh; the parent of each.
-    fn triangles(
-        &self,
-        mesh: &Mesh,
-        vertices: Vertices,
-    ) -> Result<(Mesh, Vec<TriangleId>), MeshError> {
-        let points = &vertices.points;
-        let mut triangles = Vec::with_capacity(self.triangles);
-        let mut neighbours = Vec::with_capacity(self.triangles);
-        let mut generation = Vec::with_capacity(self.triangles);
-        let mut region = Vec::with_capacity(self.triangles);
-        let mut parent = Vec::with_capacity(self.triangles);
-        let mut next = 0;
-        while next < self.entries.len() {
-            // Triangles that stay, up to the next that is split.
-            let stay = self.entries[next..].iter().position(|e| e.key & 7 != 0);
-            let run = next..stay.map_or(self.entries.len(), |n| next + n);
-            if !run.is_empty() {
-                next = run.end;
-                triangles.extend_from_slice(&self.old.triangles[run.clone()]);
-                generation.extend_from_slice(&self.old.generation[run.clone()]);
-                region.extend_from_slice(&mesh.region[run.clone()]);
-                parent.extend(run.clone().map(|t| TriangleId(t as u32)));
-                neighbours.extend(self.old.neighbours[run].iter().map(|around| {
-                    let [a, b, c] = *around;
-                    [
-                        self.behind(a).0[0],
-                        self.behind(b).0[0],
-                        self.behind(c).0[0],
-                    ]
-                }));
-                continue;
-            }
-            let t = next;
-            next += 1;
-            let entry = self.entries[t];
-            let corners = self.old.triangles[t];
-            let around = self.old.neighbours[t];
-            let old_generation = self.old.generation[t];
-            let mut vertex = [corners[0]; 8];
-            vertex[..3].copy_from_slice(&corners);
-            let mut outer = [Neighbour::BOUNDARY; 8];
-            for face in 0..3 {
-                let (ends, theirs) = self.behind(around[face]);
-                outer[2 * face] = ends[0];
-                outer[2 * face + 1] = ends[1];
-                if entry.is_split(face) {
-                    let mine = entry.owns(face);
-                    vertex[3 + face] = if mine { entry.born(face) } else { theirs };
-                }
-            }
-            let parts = &PARTS[(entry.key & 15) as usize];
-            for part in 0..parts.count as usize & 7 {
-                let [a, b, c] = parts.corners[part & 3];
-                let corners = [
-                    vertex[(a & 7) as usize],
-                    vertex[(b & 7) as usize],
-                    vertex[(c & 7) as usize],
-                ];
-                let [a, b, c] = [
-                    points[corners[0].index()],
-                    points[corners[1].index()],
-                    points[corners[2].index()],
-                ];
-                let area = signed_area([a, b, c]);
-                if area.is_nan() | (area <= 0.0) {
-                    return Err(exhausted(a, b));
-                }
-                let mut around = [Neighbour::BOUNDARY; 3];
-                for face in 0..3 {
-                    around[face] = match parts.link(part & 3, face) {
-                        Link::Inner(place) => Neighbour::at(TriangleId(entry.child), place),
-                        Link::Outer(side) => outer[side],
-                    };
-                }
-                triangles.push(corners);
-                neighbours.push(around);
-                generation.push(old_generation + parts.depth[part & 3] as u16);
-                region.push(mesh.region[t]);
-                parent.push(TriangleId(t as u32));
-            }
-        }
-        let Vertices {
-            points,
-            boundary,
-            genealogy,
-        } = vertices;
-        let topology = Topology {
-            triangles,
-            neighbours,
-            generation,
-            boundary,
-            genealogy,
-        };
-        let refined = Mesh {
-            topology,
-            points,
-            region,
-            curve: mesh.curve,
-        };
-        Ok((refined, parent))
     }
 }
 

@@ -10,7 +10,8 @@
 //! - [`sparse`], [`assemble`]: sparsity pattern, symmetric matrices, stiffness;
 //! - [`field`], [`quadrature`], [`integrate`]: data given at points, and integrals of data that jump;
 //! - [`values`]: one value for every triangle, or the same for all;
-//! - [`norms`]: seminorms and areas.
+//! - [`norms`]: seminorms and areas;
+//! - [`parallel`]: loops on several threads whose results do not depend on their number.
 //!
 //! Every length, tension and load in here is a pure number of order one: the caller has taken
 //! powers of two out of the data (see [`scale`]) and puts them back where numbers leave the program.
@@ -24,6 +25,7 @@ pub mod integrate;
 pub mod invariants;
 pub mod mesh;
 pub mod norms;
+pub mod parallel;
 mod parts;
 pub mod quadrature;
 pub mod scale;

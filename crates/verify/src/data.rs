@@ -78,7 +78,7 @@ impl<'a> Discrete<'a> {
         };
         Ok(Discrete {
             tension: pair(&problem.tension)?,
-            loads: load_pair_relative_to(&reference, mesh, load)?,
+            loads: load_pair_relative_to(&reference, mesh, load, 1)?,
             heights: [
                 heights(mesh, &*problem.height[0])?,
                 heights(mesh, &*problem.height[1])?,

@@ -8,6 +8,7 @@ use super::{
 use crate::field::{Constant, Field, FieldError, Samples};
 use crate::index::TriangleId;
 use crate::mesh::Mesh;
+use crate::parallel::{self, BLOCK};
 use crate::quadrature::{POINTS, RulePoint, affine_misfit};
 
 /// The tolerance of loads: a piece cut by a jump is quartered until its area is about this share of the domain.
@@ -62,13 +63,13 @@ pub fn loads(mesh: &Mesh, field: &dyn Field) -> Result<Loads, FieldError> {
 /// # Errors
 /// A value of a field that is not finite.
 pub fn load_pair(mesh: &Mesh, fields: [&dyn Field; 2]) -> Result<[Loads; 2], FieldError> {
-    load_pair_relative_to(&Reference::of(mesh, fields)?, mesh, fields)
+    load_pair_relative_to(&Reference::of(mesh, fields)?, mesh, fields, 1)
 }
 
 /// Integrates two loads against the hat functions: nodal loads, element means and deviations from them.
 ///
 /// Both are sampled at the same points, as many as either needs: what cancels between the loads then cancels between their integrals too. The
-/// integrals over an element depend on the element and on `reference` alone.
+/// integrals over an element depend on the element and on `reference` alone, not on the number of `threads` they are found by.
 ///
 /// # Errors
 /// A value of a field that is not finite.
@@ -76,8 +77,9 @@ pub fn load_pair_relative_to(
     reference: &Reference,
     mesh: &Mesh,
     fields: [&dyn Field; 2],
+    threads: usize,
 ) -> Result<[Loads; 2], FieldError> {
-    pair(reference, mesh, fields, |_| None)
+    pair(reference, mesh, fields, threads, |_| None)
 }
 
 /// The loads on a mesh made from another one by [`Mesh::refine`]: only the triangles that it bisected are sampled. The result is what
@@ -92,12 +94,13 @@ pub fn load_pair_carried(
     fields: [&dyn Field; 2],
     before: &[Loads; 2],
     parent: &[TriangleId],
+    threads: usize,
 ) -> Result<[Loads; 2], FieldError> {
     let reference = match before[0].reference {
         Some(reference) => reference,
         None => Reference::of(mesh, fields)?,
     };
-    pair(&reference, mesh, fields, |t| {
+    pair(&reference, mesh, fields, threads, |t| {
         kept(parent, t).map(|old| (before, old))
     })
 }
@@ -107,7 +110,8 @@ fn pair<'a>(
     reference: &Reference,
     mesh: &Mesh,
     fields: [&dyn Field; 2],
-    known: impl Fn(usize) -> Option<(&'a [Loads; 2], usize)>,
+    threads: usize,
+    known: impl Fn(usize) -> Option<(&'a [Loads; 2], usize)> + Sync,
 ) -> Result<[Loads; 2], FieldError> {
     let constants = fields.map(|f| f.constant());
     if let [Some(f), Some(g)] = constants {
@@ -119,8 +123,9 @@ fn pair<'a>(
         reference: *reference,
         elements: [0, 1].map(|i| {
             let room = if constants[i].is_some() { 0 } else { count };
-            Vec::with_capacity(room)
+            vec![ElementLoad::NONE; room]
         }),
+        threads: parallel::worthwhile(threads, count),
         sums: [Vec::new(), Vec::new()],
     };
     pair.fill(mesh, constants, known)?;
@@ -149,6 +154,8 @@ struct LoadPair<'a> {
     reference: Reference,
     /// What is known of the triangles; nothing of a constant.
     elements: [Vec<ElementLoad>; 2],
+    /// How many threads may work.
+    threads: usize,
     /// Of triangles that are divided: (f, phi_k) for the corners 0 and 1, then the first and second moment of f minus the mean that the seven points give, so
     /// that the second one does not cancel.
     sums: [Vec<[f64; 4]>; 2],
@@ -160,58 +167,71 @@ impl LoadPair<'_> {
         &mut self,
         mesh: &Mesh,
         constants: [Option<f64>; 2],
-        known: impl Fn(usize) -> Option<(&'b [Loads; 2], usize)>,
+        known: impl Fn(usize) -> Option<(&'b [Loads; 2], usize)> + Sync,
     ) -> Result<(), FieldError> {
         let count = mesh.triangle_count();
-        let mut fresh = Vec::new();
-        for t in 0..count {
-            let known = known(t);
-            if known.is_none() {
-                fresh.push(t as u32);
-            }
-            for (i, elements) in self.elements.iter_mut().enumerate() {
-                if constants[i].is_none() {
-                    elements.push(match known {
-                        Some((loads, old)) => loads[i].element(old),
-                        None => ElementLoad::NONE,
-                    });
-                }
-            }
-        }
         let control = LOAD_CONTROL;
         let allowed = Allowed {
             control,
             coarse: control.largest_share * self.reference.area,
             whole: Whole::Same(self.reference.magnitude),
         };
-        let mut wanting = Vec::new();
-        let elements = &mut self.elements;
-        let mut put = |t: usize, area: f64, loads: &[(usize, Fit)]| {
-            let mut errors = [0.0; 2];
-            for &(i, fit) in loads {
-                errors[i] = fit.error * area;
-                elements[i][t] = ElementLoad {
-                    corners: fit.corners.map(|m| m * area),
-                    mean: fit.mean,
-                    deviation_squared: fit.variance * area,
+        let fields = self.fields;
+        let mut chunks = self.elements.each_mut().map(|e| e.chunks_mut(BLOCK));
+        let jobs: Vec<_> = parallel::blocks(count)
+            .map(|block| {
+                let own = chunks.each_mut().map(|c| c.next().unwrap_or_default());
+                (block, own)
+            })
+            .collect();
+        // Every block of triangles by itself; returns those that are to be divided.
+        let results = parallel::map(self.threads, jobs, |(block, mut elements)| {
+            let begin = block.start;
+            let mut fresh = Vec::new();
+            for t in block {
+                let Some((loads, old)) = known(t) else {
+                    fresh.push(t as u32);
+                    continue;
                 };
+                for (i, elements) in elements.iter_mut().enumerate() {
+                    if constants[i].is_none() {
+                        elements[t - begin] = loads[i].element(old);
+                    }
+                }
             }
-            if area > allowed.coarse || allowed.too_large(t, errors) {
-                wanting.push(t as u32);
+            let mut wanting = Vec::new();
+            let mut put = |t: usize, area: f64, loads: &[(usize, Fit)]| {
+                let mut errors = [0.0; 2];
+                for &(i, fit) in loads {
+                    errors[i] = fit.error * area;
+                    elements[i][t - begin] = ElementLoad {
+                        corners: fit.corners.map(|m| m * area),
+                        mean: fit.mean,
+                        deviation_squared: fit.variance * area,
+                    };
+                }
+                if area > allowed.coarse || allowed.too_large(t, errors) {
+                    wanting.push(t as u32);
+                }
+            };
+            let list = fresh.into_iter();
+            // A constant has no say in how often an element is divided.
+            match constants {
+                [None, None] => whole::fit(mesh, list, fields, |t, area, [f, g]| {
+                    put(t, area, &[(0, f), (1, g)]);
+                })?,
+                _ => {
+                    let i = usize::from(constants[0].is_some());
+                    whole::fit(mesh, list, [fields[i]], |t, area, [f]| {
+                        put(t, area, &[(i, f)]);
+                    })?;
+                }
             }
-        };
-        let list = fresh.into_iter();
-        // A constant has no say in how often an element is divided.
-        match constants {
-            [None, None] => whole::fit(mesh, list, self.fields, |t, area, [f, g]| {
-                put(t, area, &[(0, f), (1, g)]);
-            })?,
-            _ => {
-                let i = usize::from(constants[0].is_some());
-                whole::fit(mesh, list, [self.fields[i]], |t, area, [f]| {
-                    put(t, area, &[(i, f)]);
-                })?;
-            }
+            Ok(wanting)
+        });
+        let mut wanting: Vec<u32> = Vec::new();
+        for result in results {
+            wanting.extend(result?);
         }
         if wanting.is_empty() {
             return Ok(());
@@ -238,9 +258,9 @@ impl LoadPair<'_> {
 
     fn finish(self, mesh: &Mesh, constants: [Option<f64>; 2]) -> [Loads; 2] {
         let reference = self.reference;
-        let mut elements = self.elements.into_iter();
-        constants.map(|constant| {
-            let elements = elements.next().unwrap_or_default();
+        let [first, second] = self.elements;
+        let [f, g] = constants;
+        let one = |constant: Option<f64>, elements: Vec<ElementLoad>| {
             let loads = match constant {
                 Some(value) => {
                     let [loads] = Loads::constant(mesh, [value]);
@@ -249,7 +269,8 @@ impl LoadPair<'_> {
                 None => Loads::new(mesh, elements),
             };
             loads.relative_to(reference)
-        })
+        };
+        parallel::both(self.threads, || one(f, first), || one(g, second)).into()
     }
 }
 
