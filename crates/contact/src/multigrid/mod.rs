@@ -1,10 +1,13 @@
 //! Multigrid: conjugate gradients preconditioned by one symmetric cycle over the bisection hierarchy, truncated on the contact set.
 //!
 //! From the bottom up: `hierarchy` (what the births say), `unknowns` (one field or two), `finest` (the matrix of the mesh), `galerkin`
-//! (those of all levels), `coarse` (the initial mesh), `cycle`, `step` and `descent` (the method), and here the fields of a
+//! (those of all levels), `coarse` (the initial mesh; `algebraic`, `aggregates` and `blocks` if it is large), `cycle`, `step` and `descent` (the method), and here the fields of a
 //! problem one after the other. Where the tensions reduce these are the mean (linear), the gap (an obstacle problem) and sigma; else both displacements
 //! together, glued where they touch, and sigma.
 
+mod aggregates;
+mod algebraic;
+mod blocks;
 mod coarse;
 mod cycle;
 mod descent;
@@ -74,7 +77,7 @@ struct Store<U: Unknowns> {
 }
 
 impl Workspace {
-    /// Takes in the mesh of a problem; false if it has no hierarchy.
+    /// Takes in the mesh of a problem; false if it has no hierarchy and is not large enough for one of aggregates.
     fn take(&mut self, problem: &DiscreteProblem) -> bool {
         let mesh = &problem.mesh;
         if self.mesh.as_ptr() == Arc::as_ptr(mesh) {
@@ -82,7 +85,9 @@ impl Workspace {
         }
         if mesh.genealogy().iter().all(|birth| birth.level == 0) {
             self.initial = along_leaves(mesh);
-            return false;
+            if mesh.boundary().iter().filter(|&&b| !b).count() <= coarse::LARGE {
+                return false;
+            }
         }
         self.hierarchy.read(mesh, Some(&self.initial));
         self.initial.clear();
@@ -121,7 +126,7 @@ impl<U: Unknowns> Store<U> {
     }
 }
 
-/// The solution by multigrid; `None` on a mesh without bisections, where the initial mesh is everything.
+/// The solution by multigrid; `None` on a mesh without bisections that is small: there the initial mesh is everything.
 ///
 /// Its status says whether every field of the model reached its goal; sigma is empty where its own solve did not converge.
 pub(crate) fn solve(
