@@ -21,7 +21,7 @@ mod unknowns;
 
 use std::sync::{Arc, Weak};
 
-use fem_core::Mesh;
+use fem_core::{Mesh, VertexId};
 
 use crate::error::SolveError;
 use crate::interior::Role;
@@ -30,6 +30,7 @@ use crate::problem::DiscreteProblem;
 use crate::reduce::Proportional;
 use crate::settings::{Settings, Tolerance};
 use crate::solution::{Cycles, Reduction, Solution, SolveInfo, Status};
+use crate::solve::ACTIVE_SET_LIMIT;
 use crate::start::Start;
 use descent::{Descent, Goal, Report, Vectors};
 use finest::Finest;
@@ -46,8 +47,17 @@ const KKT: f64 = 1e-10;
 /// The inequality is solved to this part of a prescribed KKT residual: the mean takes the rest.
 const SHARE: f64 = 0.9;
 
+/// The mean misses its rows by at most this part of what the KKT residual may be.
+const MEAN_SHARE: f64 = 0.25;
+
 /// With a contraction beyond this every level takes steps enough to see how far it has come.
 const SLOW: f64 = 0.25;
+
+/// A triangle is a needle if its longest side is more than this many times its height.
+const NEEDLE: f64 = 5.0;
+
+/// On large initial meshes with more than this share of needles the bisections are left aside, and all is left to aggregates.
+const NEEDLES: f64 = 0.25;
 
 /// What the part left by a first step grows by when it is handed on unseen: after about ten levels of one step each it is looked at
 /// again.
@@ -83,13 +93,17 @@ impl Workspace {
         if self.mesh.as_ptr() == Arc::as_ptr(mesh) {
             return true;
         }
-        if mesh.genealogy().iter().all(|birth| birth.level == 0) {
+        let births = mesh.genealogy().iter().zip(mesh.boundary());
+        let inner = births.clone().filter(|(b, fixed)| b.level == 0 && !**fixed);
+        let large = inner.count() > coarse::LARGE;
+        if births.clone().all(|(birth, _)| birth.level == 0) {
             self.initial = along_leaves(mesh);
-            if mesh.boundary().iter().filter(|&&b| !b).count() <= coarse::LARGE {
+            if !large {
                 return false;
             }
         }
-        self.hierarchy.read(mesh, Some(&self.initial));
+        let flat = large && stretched(mesh);
+        self.hierarchy.read(mesh, Some(&self.initial), flat);
         self.initial.clear();
         self.initial
             .extend_from_slice(self.hierarchy.initial_order());
@@ -98,6 +112,22 @@ impl Workspace {
         self.pair.held = None;
         true
     }
+}
+
+/// Whether the triangles of a mesh are needles: the relaxation of single vertices level by level does little there, since couplings along the short
+/// sides dominate. Aggregates follow the strong couplings.
+fn stretched(mesh: &Mesh) -> bool {
+    let points = mesh.points();
+    let needle = |v: &&[VertexId; 3]| {
+        let corner = v.map(|v| points[v.index()]);
+        let edge =
+            [(0, 1), (1, 2), (2, 0)].map(|(k, l)| [0, 1].map(|i| corner[l][i] - corner[k][i]));
+        let longest = edge.iter().map(|e| e[0] * e[0] + e[1] * e[1]);
+        let twice = (edge[0][0] * edge[1][1] - edge[0][1] * edge[1][0]).abs();
+        longest.fold(0.0, f64::max) > NEEDLE * twice
+    };
+    let needles = mesh.triangles().iter().filter(needle).count();
+    needles as f64 > NEEDLES * mesh.triangle_count() as f64
 }
 
 /// The vertices of a mesh in the order in which its triangles touch them first.
@@ -232,7 +262,7 @@ impl Run<'_> {
         };
         let load = |j: usize| model.mean_load(j);
         let vectors = self.vectors(finest, levels, boundary, initial, load, true);
-        let goal = self.goal(mean_weight, Goal::Tight);
+        let goal = self.goal(mean_weight, Goal::Tight(MEAN_SHARE * self.limit()));
         let mean = self.descend(finest, levels, None, vectors, goal)?;
         let size = mean.x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         let boundary = |j: usize| problem.heights[0][j] - problem.heights[1][j];
@@ -374,6 +404,14 @@ impl Run<'_> {
         match self.settings.tolerance {
             Tolerance::Relative(t) => t,
             Tolerance::Balanced => KKT,
+        }
+    }
+
+    /// The KKT residual that is accepted.
+    fn limit(&self) -> f64 {
+        match self.settings.tolerance {
+            Tolerance::Relative(t) => t,
+            Tolerance::Balanced => ACTIVE_SET_LIMIT,
         }
     }
 
@@ -576,7 +614,7 @@ impl Run<'_> {
         let known = self.start.and_then(|s| s.sigma.as_ref());
         let initial = |j: usize| known.map_or(0.0, |sigma| sigma[j]);
         let vectors = self.vectors(finest, levels, |_| 0.0, initial, |j| force[j], false);
-        let solved = self.descend(finest, levels, None, vectors, Goal::Tight)?;
+        let solved = self.descend(finest, levels, None, vectors, Goal::Tight(f64::INFINITY))?;
         let sigma = match solved.report.status {
             Status::Converged => {
                 let own = hierarchy.rank.iter();

@@ -62,7 +62,7 @@ fn truncate<U: Unknowns>(finest: &Finest<U>, contact: &[bool], x: &mut [U::Value
 
 fn hierarchy(problem: &DiscreteProblem) -> Hierarchy {
     let mut hierarchy = Hierarchy::default();
-    hierarchy.read(&problem.mesh, None);
+    hierarchy.read(&problem.mesh, None, false);
     hierarchy
 }
 
