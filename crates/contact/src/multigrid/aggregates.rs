@@ -48,6 +48,16 @@ impl<U: Unknowns> Matrix<'_, U> {
     }
 }
 
+/// A matrix over aggregates.
+pub(crate) struct Own<U: Unknowns> {
+    pub start: Vec<u32>,
+    pub column: Vec<u32>,
+    pub block: Vec<U::Coupling>,
+    pub pivot: Vec<U::Pivot>,
+    /// Inverses of the diagonal blocks; the products leave them to others.
+    pub inverse: Vec<U::Pivot>,
+}
+
 /// Weights of the aggregates at every vertex; none at vertices that are no unknowns.
 #[derive(Default)]
 pub(crate) struct Prolongation {
@@ -315,25 +325,41 @@ impl Prolongation {
         (start, list)
     }
 
-    /// The values of P'AP in a pattern that holds all its entries; O(n).
-    pub fn product<U: Unknowns>(
-        &self,
-        a: &Matrix<U>,
-        start: &[u32],
-        column: &[u32],
-        block: &mut [U::Coupling],
-        pivot: &mut [U::Pivot],
-    ) {
-        block.fill(U::Coupling::default());
-        pivot.fill(U::Pivot::default());
+    /// The values of P'AP between aggregates that are `dirty`, in a pattern that holds all its entries; O(n).
+    ///
+    /// Every entry is a sum in the same order whatever else is made anew.
+    pub fn product<U: Unknowns>(&self, a: &Matrix<U>, dirty: &[bool], coarse: &mut Own<U>) {
+        let Own {
+            start,
+            column,
+            block,
+            pivot,
+            ..
+        } = coarse;
+        for k in (0..self.coarse).filter(|&k| dirty[k]) {
+            pivot[k] = U::Pivot::default();
+            for s in start[k] as usize..start[k + 1] as usize {
+                if dirty[column[s] as usize] {
+                    block[s] = U::Coupling::default();
+                }
+            }
+        }
         let slot = |k: usize, l: usize| {
             let list = start[k] as usize..start[k + 1] as usize;
             let at = column[list.clone()].iter().position(|&c| c as usize == l);
             at.map(|at| list.start + at)
         };
+        let nothing = U::Pivot::default();
         for x in 0..a.len() {
-            let row = self.row(x);
             let own = a.pivot[x];
+            // Without a diagonal entry the row is empty.
+            if own == nothing {
+                continue;
+            }
+            let row = self.row(x).filter(|&(k, _)| dirty[k]);
+            if row.clone().next().is_none() {
+                continue;
+            }
             for (k, w) in row.clone() {
                 pivot[k] = pivot[k].plus(w * w, own);
                 for (l, v) in row.clone().filter(|&(l, _)| l < k) {
@@ -343,8 +369,12 @@ impl Prolongation {
                 }
             }
             for e in a.row(x) {
+                let y = a.column[e] as usize;
+                if a.pivot[y] == nothing {
+                    continue;
+                }
                 let c = a.block[e];
-                for (l, v) in self.row(a.column[e] as usize) {
+                for (l, v) in self.row(y).filter(|&(l, _)| dirty[l]) {
                     for (k, w) in row.clone() {
                         if k == l {
                             pivot[k] = pivot[k].plus_both(w * v, c);

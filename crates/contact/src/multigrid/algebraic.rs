@@ -5,7 +5,7 @@
 //! matrices are Galerkin products with the truncated one and are made anew with every truncation, O(n). The cycle is a fixed
 //! symmetric positive definite operator between two truncations.
 
-use super::aggregates::{Matrix, Prolongation};
+use super::aggregates::{Matrix, Own, Prolongation};
 use super::hierarchy::{Hierarchy, refill};
 use super::unknowns::{EMPTY, Unknowns};
 use crate::cholesky::{Cholesky, FactorError, Lower};
@@ -35,15 +35,31 @@ enum State {
     Truncated,
 }
 
+impl<U: Unknowns> Own<U> {
+    fn matrix(&self) -> Matrix<'_, U> {
+        Matrix {
+            start: &self.start,
+            column: &self.column,
+            block: &self.block,
+            pivot: &self.pivot,
+        }
+    }
+
+    fn smoother(&self) -> Smoother<'_, U> {
+        Smoother {
+            a: self.matrix(),
+            inverse: &self.inverse,
+        }
+    }
+}
+
 /// One level of aggregates.
 struct Coarse<U: Unknowns> {
     /// From the level above, which is finer.
     from: Prolongation,
-    start: Vec<u32>,
-    column: Vec<u32>,
-    block: Vec<U::Coupling>,
-    pivot: Vec<U::Pivot>,
-    inverse: Vec<U::Pivot>,
+    own: Own<U>,
+    /// Aggregates one of whose vertices has changed.
+    dirty: Vec<bool>,
     /// Diagonals without truncation, which tell what is rounding.
     diagonal: Vec<U::Plain>,
     r: Vec<U::Value>,
@@ -57,6 +73,10 @@ pub(crate) struct Algebraic<U: Unknowns> {
     state: State,
     /// The untruncated diagonals that the aggregates were made for; empty before.
     made_for: Vec<U::Plain>,
+    /// Diagonals of the matrix that the coarser ones are products of.
+    pivot: Vec<U::Pivot>,
+    /// Vertices whose rows have changed, or a neighbour's.
+    dirty: Vec<bool>,
     inverse: Vec<U::Pivot>,
     rest: Vec<U::Value>,
     coarse: Vec<Coarse<U>>,
@@ -84,6 +104,8 @@ impl<U: Unknowns> Default for Algebraic<U> {
         Algebraic {
             state: State::Stale,
             made_for: Vec::new(),
+            pivot: Vec::new(),
+            dirty: Vec::new(),
             inverse: Vec::new(),
             rest: Vec::new(),
             coarse: Vec::new(),
@@ -124,25 +146,48 @@ impl<U: Unknowns> Algebraic<U> {
             self.make(&a);
             self.made_for.clear();
             self.made_for.extend(pivot.iter().map(diagonal_of::<U>));
+        } else {
+            self.compare(&a);
+            for level in 0..self.coarse.len() {
+                let (above, here) = self.coarse.split_at_mut(level);
+                match above.last() {
+                    Some(above) => here[0].take(&above.own.matrix(), &above.dirty, plain),
+                    None => here[0].take(&a, &self.dirty, plain),
+                }
+            }
         }
+        self.pivot.clear();
+        self.pivot.extend_from_slice(pivot);
         refill(&mut self.rest, a.len(), U::Value::default());
         let rows = pivot.iter().zip(diagonal);
         self.inverse.clear();
         self.inverse
             .extend(rows.map(|(&d, &plain)| U::inverse(d, plain)));
-        for level in 0..self.coarse.len() {
-            let (above, here) = self.coarse.split_at_mut(level);
-            let finer = above
-                .last()
-                .map_or_else(|| finest(hierarchy, coupling, pivot), Coarse::matrix);
-            here[0].take(&finer, plain);
-        }
         self.state = if plain {
             State::Plain
         } else {
             State::Truncated
         };
         self.factor()
+    }
+
+    /// Finds the rows that have changed. A truncated hat function is another one exactly where its diagonal entry is.
+    fn compare(&mut self, a: &Matrix<U>) {
+        let known = self.pivot.len() == a.len() && self.state != State::Stale;
+        refill(&mut self.dirty, a.len(), !known);
+        if known {
+            for x in 0..a.len() {
+                let changed = self.pivot[x] != a.pivot[x];
+                self.dirty[x] |= changed;
+                for e in a.row(x) {
+                    let y = a.column[e] as usize;
+                    if changed || self.pivot[y] != a.pivot[y] {
+                        self.dirty[x] = true;
+                        self.dirty[y] = true;
+                    }
+                }
+            }
+        }
     }
 
     /// Whether the aggregates at hand were made for a matrix like this one.
@@ -161,7 +206,7 @@ impl<U: Unknowns> Algebraic<U> {
         self.coarse.clear();
         for depth in 0..LEVELS {
             let next = {
-                let own = self.coarse.last().map(Coarse::matrix);
+                let own = self.coarse.last().map(|c| c.own.matrix());
                 let finer = own.as_ref().unwrap_or(a);
                 let unknowns = finer.pivot.iter().filter(|&&d| U::pivot_at(d, 0, 0) > 0.0);
                 let unknowns = unknowns.count();
@@ -174,7 +219,7 @@ impl<U: Unknowns> Algebraic<U> {
                     break;
                 }
                 let mut next = Coarse::new(from, finer);
-                next.take(finer, true);
+                next.take(finer, &vec![true; finer.len()], true);
                 next
             };
             self.coarse.push(next);
@@ -188,13 +233,13 @@ impl<U: Unknowns> Algebraic<U> {
         };
         let w = U::WIDTH as u32;
         let mut entries = Vec::new();
-        for x in 0..bottom.pivot.len() as u32 {
+        for x in 0..bottom.own.pivot.len() as u32 {
             for j in 0..w {
                 for i in j..w {
                     entries.push((w * x + j, w * x + i, Source::Pivot(x, i as u8, j as u8)));
                 }
-                for e in bottom.start[x as usize]..bottom.start[x as usize + 1] {
-                    let y = bottom.column[e as usize];
+                for e in bottom.own.start[x as usize]..bottom.own.start[x as usize + 1] {
+                    let y = bottom.own.column[e as usize];
                     for i in 0..w {
                         entries.push((w * y + j, w * x + i, Source::Edge(e, i as u8, j as u8)));
                     }
@@ -212,7 +257,7 @@ impl<U: Unknowns> Algebraic<U> {
         }
         self.lower.start.push(self.lower.row.len() as u32);
         self.lower.value = vec![0.0; self.source.len()];
-        self.rhs = vec![0.0; U::WIDTH * bottom.pivot.len()];
+        self.rhs = vec![0.0; U::WIDTH * bottom.own.pivot.len()];
     }
 
     /// Factors the bottom matrix, unless it is the same still.
@@ -223,10 +268,10 @@ impl<U: Unknowns> Algebraic<U> {
         for (value, source) in self.lower.value.iter_mut().zip(&self.source) {
             *value = match *source {
                 Source::Edge(e, i, j) => {
-                    U::coupling_at(bottom.block[e as usize], i as usize, j as usize)
+                    U::coupling_at(bottom.own.block[e as usize], i as usize, j as usize)
                 }
                 Source::Pivot(x, i, j) => {
-                    let own = U::pivot_at(bottom.pivot[x as usize], i as usize, j as usize);
+                    let own = U::pivot_at(bottom.own.pivot[x as usize], i as usize, j as usize);
                     let plain = U::plain_at(bottom.diagonal[x as usize], i as usize);
                     match (i == j, own > EMPTY * plain) {
                         (false, _) => own,
@@ -265,15 +310,7 @@ impl<U: Unknowns> Algebraic<U> {
         let mut finer = &self.rest;
         for next in &mut self.coarse {
             next.from.restrict::<U>(finer, &mut next.r);
-            let smoother: Smoother<'_, U> = Smoother {
-                a: Matrix {
-                    start: &next.start,
-                    column: &next.column,
-                    block: &next.block,
-                    pivot: &next.pivot,
-                },
-                inverse: &next.inverse,
-            };
+            let smoother = next.own.smoother();
             smoother.forwards(&next.r, &mut next.c, &mut next.rest);
             finer = &next.rest;
         }
@@ -292,15 +329,7 @@ impl<U: Unknowns> Algebraic<U> {
             let (above, here) = self.coarse.split_at_mut(level);
             let above = &mut above[level - 1];
             here[0].from.prolong::<U>(&here[0].c, &mut above.c);
-            let smoother: Smoother<'_, U> = Smoother {
-                a: Matrix {
-                    start: &above.start,
-                    column: &above.column,
-                    block: &above.block,
-                    pivot: &above.pivot,
-                },
-                inverse: &above.inverse,
-            };
+            let smoother = above.own.smoother();
             smoother.backwards(&mut above.r, &mut above.c);
         }
         if let Some(first) = self.coarse.first() {
@@ -332,15 +361,7 @@ impl<U: Unknowns> Algebraic<U> {
             if let Some(below) = below.first() {
                 below.from.prolong::<U>(&below.c, &mut here.c);
             }
-            let smoother: Smoother<'_, U> = Smoother {
-                a: Matrix {
-                    start: &here.start,
-                    column: &here.column,
-                    block: &here.block,
-                    pivot: &here.pivot,
-                },
-                inverse: &here.inverse,
-            };
+            let smoother = here.own.smoother();
             let sweeps = if level + 1 == bottom {
                 BOTTOM_SWEEPS
             } else {
@@ -386,45 +407,35 @@ impl<U: Unknowns> Coarse<U> {
         let n = from.coarse;
         let (start, column) = from.pattern(finer);
         Coarse {
-            block: vec![U::Coupling::default(); column.len()],
-            pivot: vec![U::Pivot::default(); n],
-            inverse: vec![U::Pivot::default(); n],
+            own: Own {
+                block: vec![U::Coupling::default(); column.len()],
+                pivot: vec![U::Pivot::default(); n],
+                inverse: vec![U::Pivot::default(); n],
+                start,
+                column,
+            },
             diagonal: vec![U::Plain::default(); n],
             r: vec![U::Value::default(); n],
             c: vec![U::Value::default(); n],
             rest: vec![U::Value::default(); n],
             bound: vec![0.0; n],
+            dirty: vec![true; n],
             from,
-            start,
-            column,
         }
     }
 
-    fn matrix(&self) -> Matrix<'_, U> {
-        Matrix {
-            start: &self.start,
-            column: &self.column,
-            block: &self.block,
-            pivot: &self.pivot,
+    /// The Galerkin product with the matrix of the level above, some of whose rows have changed.
+    fn take(&mut self, finer: &Matrix<U>, changed: &[bool], plain: bool) {
+        self.dirty.fill(false);
+        for x in (0..finer.len()).filter(|&x| changed[x]) {
+            self.from.row(x).for_each(|(k, _)| self.dirty[k] = true);
         }
-    }
-
-    /// The Galerkin product with the matrix of the level above.
-    fn take(&mut self, finer: &Matrix<U>, plain: bool) {
-        let Coarse {
-            from,
-            start,
-            column,
-            block,
-            pivot,
-            ..
-        } = self;
-        from.product(finer, start, column, block, pivot);
-        for k in 0..self.pivot.len() {
+        self.from.product(finer, &self.dirty, &mut self.own);
+        for k in 0..self.dirty.len() {
             if plain {
-                self.diagonal[k] = diagonal_of::<U>(&self.pivot[k]);
+                self.diagonal[k] = diagonal_of::<U>(&self.own.pivot[k]);
             }
-            self.inverse[k] = U::inverse(self.pivot[k], self.diagonal[k]);
+            self.own.inverse[k] = U::inverse(self.own.pivot[k], self.diagonal[k]);
         }
     }
 }

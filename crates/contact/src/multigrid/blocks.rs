@@ -9,7 +9,7 @@ pub(crate) trait Block: Copy + Default {
 }
 
 /// Symmetric diagonal block that goes with blocks of type `C`.
-pub(crate) trait Symmetric<C>: Copy + Default {
+pub(crate) trait Symmetric<C>: Copy + Default + PartialEq {
     /// x + t y.
     fn plus(self, t: f64, y: Self) -> Self;
     /// x + t (c + c').
