@@ -388,3 +388,64 @@ impl Prolongation {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::unknowns::Scalar;
+    use super::*;
+
+    /// The five-point matrix of n by n cells, couplings 1 along rows and `weak` across, and an obtuse pair of entries here and there.
+    #[test]
+    fn weights_are_nonnegative_and_follow_strong_couplings() {
+        let n = 12;
+        for weak in [1.0, 1e-3] {
+            let (mut start, mut column, mut block) = (vec![0u32], Vec::new(), Vec::new());
+            for x in 0..n * n {
+                let mut put = |y: usize, value: f64| {
+                    column.push(y as u32);
+                    block.push(value);
+                };
+                if x >= n {
+                    put(x - n, -weak);
+                }
+                if x % n > 0 {
+                    let obtuse = x % 7 == 0 && (2..n - 1).contains(&(x % n));
+                    put(x - 1, if obtuse { 0.1 } else { -1.0 });
+                }
+                start.push(column.len() as u32);
+            }
+            // A row sum of zero but for the boundary.
+            let mut pivot = vec![0.0; n * n];
+            for x in 0..n * n {
+                for e in start[x] as usize..start[x + 1] as usize {
+                    pivot[x] -= block[e];
+                    pivot[column[e] as usize] -= block[e];
+                }
+                if x < n {
+                    pivot[x] += weak;
+                }
+            }
+            let a: Matrix<Scalar> = Matrix {
+                start: &start,
+                column: &column,
+                block: &block,
+                pivot: &pivot,
+            };
+            let p = Prolongation::new(&a, 0);
+            assert!(p.coarse < n * n / 2);
+            for x in 0..n * n {
+                assert!(p.row(x).all(|(_, w)| w >= 0.0));
+                let sum: f64 = p.row(x).map(|(_, w)| w).sum();
+                let boundary = x < n && weak == 1.0;
+                let near = if boundary { sum < 1.0 } else { sum > 0.99 };
+                assert!(near && sum <= 1.0 + 1e-14, "{weak} {x}: {sum}");
+                // Across weak couplings nothing is interpolated.
+                if weak < 1.0 {
+                    let rows = (0..n * n)
+                        .filter(|&y| p.row(y).any(|(k, _)| p.row(x).any(|(l, _)| k == l)));
+                    assert!(rows.into_iter().all(|y| y / n == x / n));
+                }
+            }
+        }
+    }
+}
