@@ -1,7 +1,8 @@
-//! The initial mesh, however large: a sparse Cholesky factor of its truncated matrix.
+//! The initial mesh: a sparse Cholesky factor of its truncated matrix, or multigrid over aggregates ([`super::algebraic`]) if it is large.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+use super::algebraic::Algebraic;
 use super::hierarchy::Hierarchy;
 use super::unknowns::{EMPTY, Unknowns};
 use crate::cholesky::{Cholesky, FactorError, Lower};
@@ -17,6 +18,9 @@ const SMALL: usize = 30;
 
 /// Beyond that it is renewed when a diagonal has changed by more than this factor; until then it is a preconditioner nearly as good.
 const CHANGE: f64 = 1.25;
+
+/// An initial mesh with more inner vertices than this is large: aggregates take the place of its factor.
+pub(super) const LARGE: usize = 5000;
 
 /// Where a value of the factored matrix comes from.
 #[derive(Clone, Copy)]
@@ -43,6 +47,8 @@ pub(crate) struct MacroSolver<U: Unknowns> {
     factored: Vec<f64>,
     rhs: Vec<f64>,
     always: bool,
+    /// For a large mesh, and then nothing else is.
+    algebraic: Option<Box<Algebraic<U>>>,
     /// Numeric factorisations since it was fitted last.
     pub factorisations: usize,
     /// What it was made for: the edges of the initial mesh and its boundary, as far as a hash tells.
@@ -59,11 +65,19 @@ impl<U: Unknowns> MacroSolver<U> {
         }
         self.always = self.inner.len() * SMALL <= hierarchy.len();
         self.factorisations = 0;
+        if let Some(algebraic) = &mut self.algebraic {
+            algebraic.renew();
+        }
+    }
+
+    /// Whether the untruncated matrix has to come before any truncated one.
+    pub fn plain_first(&self) -> bool {
+        self.algebraic.as_ref().is_some_and(|a| a.unmade())
     }
 
     /// Whether every matrix is factored for itself, so that a solution does not depend on those before it.
     pub fn is_small(&self) -> bool {
-        self.always
+        self.always && self.inner.len() <= LARGE
     }
 
     /// The pattern; it is analysed when it is factored first.
@@ -72,6 +86,13 @@ impl<U: Unknowns> MacroSolver<U> {
         let inner: Vec<u32> = (0..n0 as u32)
             .filter(|&x| !hierarchy.fixed[x as usize])
             .collect();
+        if inner.len() > LARGE {
+            return MacroSolver {
+                inner,
+                algebraic: Some(Box::default()),
+                ..MacroSolver::default()
+            };
+        }
         let mut unknown = vec![u32::MAX; n0];
         for (k, &x) in inner.iter().enumerate() {
             unknown[x as usize] = k as u32;
@@ -130,6 +151,7 @@ impl<U: Unknowns> MacroSolver<U> {
             inner,
             lower,
             source,
+            algebraic: None,
             cholesky: None,
             factored: Vec::new(),
             factorisations: 0,
@@ -137,14 +159,26 @@ impl<U: Unknowns> MacroSolver<U> {
         }
     }
 
-    /// Takes the matrix of the initial mesh and factors it, unless the factor at hand still serves.
+    /// Takes the matrix of the initial mesh and factors it, unless the factor at hand still serves; `plain` says that it is not truncated.
     pub fn prepare(
         &mut self,
         hierarchy: &Hierarchy,
         pivot: &[U::Pivot],
         coupling: &[U::Coupling],
         diagonal: &[U::Plain],
+        plain: bool,
     ) -> Result<(), SolveError> {
+        let explain = |e| match e {
+            FactorError::Pivot(row) => SolveError::NotPositiveDefinite {
+                vertex: hierarchy.vertex[self.inner[row / U::WIDTH] as usize] as usize,
+            },
+            FactorError::TooLarge(order) => SolveError::TooLarge { order },
+        };
+        if let Some(algebraic) = &mut self.algebraic {
+            let factored = algebraic.prepare(hierarchy, pivot, coupling, diagonal, plain);
+            self.factorisations += usize::from(factored.map_err(explain)?);
+            return Ok(());
+        }
         for &y in &self.inner {
             let y = y as usize;
             self.block[y] = [pivot[y], U::inverse(pivot[y], diagonal[y])];
@@ -179,12 +213,6 @@ impl<U: Unknowns> MacroSolver<U> {
         if self.inner.is_empty() || same || (close && !self.always && !self.factored.is_empty()) {
             return Ok(());
         }
-        let explain = |e| match e {
-            FactorError::Pivot(row) => SolveError::NotPositiveDefinite {
-                vertex: hierarchy.vertex[self.inner[row / U::WIDTH] as usize] as usize,
-            },
-            FactorError::TooLarge(order) => SolveError::TooLarge { order },
-        };
         let cholesky = match &mut self.cholesky {
             Some(cholesky) => cholesky,
             none => none.insert(Cholesky::analyse(&self.lower).map_err(explain)?),
@@ -196,8 +224,17 @@ impl<U: Unknowns> MacroSolver<U> {
         Ok(())
     }
 
-    /// c = A_0^(-1) r on the initial mesh.
-    pub fn solve(&mut self, r: &[U::Value], c: &mut [U::Value]) {
+    /// c = A_0^(-1) r on the initial mesh, or one cycle on a large one. Destroys r.
+    pub fn solve(
+        &mut self,
+        hierarchy: &Hierarchy,
+        coupling: &[U::Coupling],
+        r: &mut [U::Value],
+        c: &mut [U::Value],
+    ) {
+        if let Some(algebraic) = &mut self.algebraic {
+            return algebraic.cycle(hierarchy, coupling, r, c);
+        }
         let w = U::WIDTH;
         let Some(cholesky) = &mut self.cholesky else {
             return;
@@ -213,9 +250,10 @@ impl<U: Unknowns> MacroSolver<U> {
         }
     }
 
-    /// Relaxes every vertex under its bound, forwards and backwards; `r` is the residual that belongs to `c`.
+    /// Relaxes every vertex under its bound, forwards and backwards; `r` is the residual that belongs to `c`, which is 0 on a large mesh:
+    /// there it is one monotone cycle.
     pub fn relax_bounded(
-        &self,
+        &mut self,
         hierarchy: &Hierarchy,
         coupling: &[U::Coupling],
         r: &mut [U::Value],
@@ -223,6 +261,9 @@ impl<U: Unknowns> MacroSolver<U> {
         bound: &[f64],
         sweeps: usize,
     ) {
+        if let Some(algebraic) = &mut self.algebraic {
+            return algebraic.monotone_cycle(hierarchy, coupling, r, c, bound);
+        }
         let mut relax = |x: usize| {
             let [block, inverse] = self.block[x];
             let free = U::plus(c[x], 1.0, U::times(inverse, r[x]));

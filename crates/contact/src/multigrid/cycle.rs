@@ -49,7 +49,10 @@ impl<U: Unknowns> Levels<U> {
             }
         }
         c[..n0].fill(U::Value::default());
-        self.initial.solve(&r[..n0], &mut c[..n0]);
+        let edges = 4 * hierarchy.quad.len();
+        let slots = edges..edges + hierarchy.macro_end.len();
+        self.initial
+            .solve(hierarchy, &self.coupling[slots], &mut r[..n0], &mut c[..n0]);
         for level in 1..=hierarchy.depth() {
             let new = hierarchy.ranks(level);
             let quads = &hierarchy.quad[new.start - n0..new.end - n0];

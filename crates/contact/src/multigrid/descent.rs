@@ -59,8 +59,9 @@ const LEAST_LEFT: f64 = 0.02;
 pub(crate) enum Goal {
     /// The largest |r_j|/d_j in the rows that must vanish is at most this part of the largest value.
     Kkt(f64),
-    /// |r| <= 1e-12 |b| in the Euclidean norm, or what rounding allows.
-    Tight,
+    /// |r| <= 1e-12 |b| in the Euclidean norm, or what rounding allows, and the largest |r_j|/d_j at most this part of the largest value: where the
+    /// tension jumps the norm does not see its low side.
+    Tight(f64),
     /// The estimate of the squared error in the norm of the matrix is at most this.
     Energy(f64),
 }
@@ -239,10 +240,13 @@ impl<'a, U: Unknowns> Descent<'a, U> {
                     history.push(worst / (t * size));
                     worst <= t * size
                 }
-                Goal::Tight => {
+                Goal::Tight(most) => {
                     let over = (reading.residual_squared / self.tight()).sqrt();
                     history.push(over);
-                    over <= 1.0
+                    over <= 1.0 && {
+                        let (worst, size) = self.misfit();
+                        worst <= most * size
+                    }
                 }
                 Goal::Energy(target) => {
                     let later = losses.iter().skip(1).sum::<f64>();

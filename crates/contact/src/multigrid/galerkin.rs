@@ -70,6 +70,10 @@ impl<U: Unknowns> Levels<U> {
         finest: &Finest<U>,
         contact: &[bool],
     ) -> Result<(), SolveError> {
+        let plain = contact.is_empty() || !contact.contains(&true);
+        if !plain && self.initial.plain_first() {
+            self.sweep(hierarchy, finest, &[])?;
+        }
         self.fill(hierarchy, finest, contact);
         let n0 = hierarchy.initial();
         for level in (1..=hierarchy.depth()).rev() {
@@ -110,6 +114,7 @@ impl<U: Unknowns> Levels<U> {
             &self.pivot[..n0],
             &self.coupling[slots],
             &finest.diagonal[..n0],
+            plain,
         )
     }
 

@@ -10,7 +10,7 @@
 //! T_l are a prefix of every array. Every edge of every T_l was made together with its younger end p and joins it to one of a, b, c, d:
 //! it is slot 4 (p - n_0) + k of a flat array, n_0 the size of the initial mesh, whose own edges follow behind.
 
-use fem_core::{Mesh, Neighbour, VertexId};
+use fem_core::{Birth, Mesh, Neighbour, VertexId};
 
 /// The order of elimination, the slots of all edges and the rows to be smoothed.
 ///
@@ -136,9 +136,10 @@ pub(crate) fn refill<T: Clone>(vector: &mut Vec<T>, len: usize, value: T) {
 impl Hierarchy {
     /// Reads the hierarchy of a mesh off its births; O(N), no searching beyond the edges of a vertex.
     ///
-    /// `initial` is the order of the vertices of the initial mesh, where it is known; else they follow the leaves of this one.
-    pub fn read(&mut self, mesh: &Mesh, initial: Option<&[u32]>) {
-        let degree = self.number(mesh, initial);
+    /// `initial` is the order of the vertices of the initial mesh, where it is known; else they follow the leaves of this one. With `flat`
+    /// the births are left aside, and the mesh itself counts as the initial one.
+    pub fn read(&mut self, mesh: &Mesh, initial: Option<&[u32]>, flat: bool) {
+        let degree = self.number(mesh, initial, flat);
         let n0 = self.initial();
         let boundary = mesh.boundary();
         self.fixed.clear();
@@ -316,12 +317,13 @@ impl Hierarchy {
     }
 
     /// Numbers the vertices by level, within a level along the leaves; the number of edges of every vertex of the mesh.
-    fn number(&mut self, mesh: &Mesh, initial: Option<&[u32]>) -> Vec<u32> {
+    fn number(&mut self, mesh: &Mesh, initial: Option<&[u32]>, flat: bool) -> Vec<u32> {
         let births = mesh.genealogy();
-        let depth = births.iter().map(|b| b.level).max().unwrap_or(0) as usize;
+        let level = |birth: &Birth| if flat { 0 } else { birth.level as usize };
+        let depth = births.iter().map(level).max().unwrap_or(0);
         refill(&mut self.level, depth + 2, 0);
         for birth in births {
-            self.level[birth.level as usize + 1] += 1;
+            self.level[level(birth) + 1] += 1;
         }
         for l in 0..=depth {
             self.level[l + 1] += self.level[l];
@@ -343,7 +345,7 @@ impl Hierarchy {
                 // Every corner of a triangle begins one edge of it; an edge on the boundary has no triangle that would count its end.
                 degree[j] += 1 + u32::from(around[(i + 1) % 3] == Neighbour::BOUNDARY);
                 if self.rank[j] == u32::MAX {
-                    let at = &mut next[births[j].level as usize];
+                    let at = &mut next[level(&births[j])];
                     self.vertex[*at as usize] = j as u32;
                     self.rank[j] = *at;
                     *at += 1;

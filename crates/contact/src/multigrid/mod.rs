@@ -1,10 +1,13 @@
 //! Multigrid: conjugate gradients preconditioned by one symmetric cycle over the bisection hierarchy, truncated on the contact set.
 //!
 //! From the bottom up: `hierarchy` (what the births say), `unknowns` (one field or two), `finest` (the matrix of the mesh), `galerkin`
-//! (those of all levels), `coarse` (the initial mesh), `cycle`, `step` and `descent` (the method), and here the fields of a
+//! (those of all levels), `coarse` (the initial mesh; `algebraic`, `aggregates` and `blocks` if it is large), `cycle`, `step` and `descent` (the method), and here the fields of a
 //! problem one after the other. Where the tensions reduce these are the mean (linear), the gap (an obstacle problem) and sigma; else both displacements
 //! together, glued where they touch, and sigma.
 
+mod aggregates;
+mod algebraic;
+mod blocks;
 mod coarse;
 mod cycle;
 mod descent;
@@ -18,7 +21,7 @@ mod unknowns;
 
 use std::sync::{Arc, Weak};
 
-use fem_core::Mesh;
+use fem_core::{Mesh, VertexId};
 
 use crate::error::SolveError;
 use crate::interior::Role;
@@ -27,6 +30,7 @@ use crate::problem::DiscreteProblem;
 use crate::reduce::Proportional;
 use crate::settings::{Settings, Tolerance};
 use crate::solution::{Cycles, Reduction, Solution, SolveInfo, Status};
+use crate::solve::ACTIVE_SET_LIMIT;
 use crate::start::Start;
 use descent::{Descent, Goal, Report, Vectors};
 use finest::Finest;
@@ -47,8 +51,17 @@ const SHARE: f64 = 0.9;
 /// ordinary shapes has magnitudes of twice its diagonal.
 const FAR: f64 = 64.0;
 
+/// The mean misses its rows by at most this part of what the KKT residual may be.
+const MEAN_SHARE: f64 = 0.25;
+
 /// With a contraction beyond this every level takes steps enough to see how far it has come.
 const SLOW: f64 = 0.25;
+
+/// A triangle is a needle if its longest side is more than this many times its height.
+const NEEDLE: f64 = 5.0;
+
+/// On large initial meshes with more than this share of needles the bisections are left aside, and all is left to aggregates.
+const NEEDLES: f64 = 0.25;
 
 /// What the part left by a first step grows by when it is handed on unseen: after about ten levels of one step each it is looked at
 /// again.
@@ -87,16 +100,22 @@ impl Workspace {
         }
     }
 
-    /// Takes in a mesh; false if it has no hierarchy.
+    /// Takes in a mesh; false if it has no hierarchy and is not large enough for one of aggregates.
     fn take(&mut self, mesh: &Arc<Mesh>) -> bool {
         if self.mesh.as_ptr() == Arc::as_ptr(mesh) {
             return true;
         }
-        if mesh.genealogy().iter().all(|birth| birth.level == 0) {
+        let births = mesh.genealogy().iter().zip(mesh.boundary());
+        let inner = births.clone().filter(|(b, fixed)| b.level == 0 && !**fixed);
+        let large = inner.count() > coarse::LARGE;
+        if births.clone().all(|(birth, _)| birth.level == 0) {
             self.initial = along_leaves(mesh);
-            return false;
+            if !large {
+                return false;
+            }
         }
-        self.hierarchy.read(mesh, Some(&self.initial));
+        let flat = large && stretched(mesh);
+        self.hierarchy.read(mesh, Some(&self.initial), flat);
         self.initial.clear();
         self.initial
             .extend_from_slice(self.hierarchy.initial_order());
@@ -105,6 +124,22 @@ impl Workspace {
         self.pair.held = None;
         true
     }
+}
+
+/// Whether the triangles of a mesh are needles: the relaxation of single vertices level by level does little there, since couplings along the short
+/// sides dominate. Aggregates follow the strong couplings.
+fn stretched(mesh: &Mesh) -> bool {
+    let points = mesh.points();
+    let needle = |v: &&[VertexId; 3]| {
+        let corner = v.map(|v| points[v.index()]);
+        let edge =
+            [(0, 1), (1, 2), (2, 0)].map(|(k, l)| [0, 1].map(|i| corner[l][i] - corner[k][i]));
+        let longest = edge.iter().map(|e| e[0] * e[0] + e[1] * e[1]);
+        let twice = (edge[0][0] * edge[1][1] - edge[0][1] * edge[1][0]).abs();
+        longest.fold(0.0, f64::max) > NEEDLE * twice
+    };
+    let needles = mesh.triangles().iter().filter(needle).count();
+    needles as f64 > NEEDLES * mesh.triangle_count() as f64
 }
 
 /// The vertices of a mesh in the order in which its triangles touch them first.
@@ -144,7 +179,7 @@ impl<U: Unknowns> Store<U> {
     }
 }
 
-/// The solution by multigrid; `None` on a mesh without bisections, where the initial mesh is everything.
+/// The solution by multigrid; `None` on a mesh without bisections that is small: there the initial mesh is everything.
 ///
 /// Its status says whether every field of the model reached its goal; sigma is empty where its own solve did not converge.
 pub(crate) fn solve(
@@ -250,7 +285,7 @@ impl Run<'_> {
         } = store;
         let finest = &*finest;
         let [mean_weight, gap_weight] = model.energy_weights();
-        let mean_goal = self.goal(mean_weight, Goal::Tight);
+        let mean_goal = self.goal(mean_weight, Goal::Tight(MEAN_SHARE * self.limit()));
         let gap_goal = self.goal(gap_weight, Goal::Kkt(0.5 * SHARE * self.kkt()));
         // Only a KKT residual is relative to the mean, and a large initial mesh keeps its factor from the one to the other.
         let apart = matches!(gap_goal, Goal::Energy(_)) && levels.initial.is_small();
@@ -445,6 +480,14 @@ impl Run<'_> {
         match self.settings.tolerance {
             Tolerance::Relative(t) => t,
             Tolerance::Balanced => KKT,
+        }
+    }
+
+    /// The KKT residual that is accepted.
+    fn limit(&self) -> f64 {
+        match self.settings.tolerance {
+            Tolerance::Relative(t) => t,
+            Tolerance::Balanced => ACTIVE_SET_LIMIT,
         }
     }
 
@@ -647,7 +690,7 @@ impl Run<'_> {
         let known = self.start.and_then(|s| s.sigma.as_ref());
         let initial = |j: usize| known.map_or(0.0, |sigma| sigma[j]);
         let vectors = self.vectors(finest, levels, |_| 0.0, initial, |j| force[j], false);
-        let solved = self.descend(finest, levels, None, vectors, Goal::Tight)?;
+        let solved = self.descend(finest, levels, None, vectors, Goal::Tight(f64::INFINITY))?;
         let sigma = match solved.report.status {
             Status::Converged => {
                 let own = hierarchy.rank.iter();

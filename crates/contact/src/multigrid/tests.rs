@@ -12,7 +12,12 @@ use crate::problem::DiscreteProblem;
 
 /// A graded mesh of a distorted initial one, with variable tensions.
 fn problem(levels: usize) -> DiscreteProblem {
-    let mut mesh: Mesh = distorted(3, 0.3, 7);
+    problem_on(3, levels)
+}
+
+/// As [`problem`], the initial mesh of n by n cells.
+fn problem_on(n: usize, levels: usize) -> DiscreteProblem {
+    let mut mesh: Mesh = distorted(n, 0.3, 7);
     let mut random = Random(11);
     for _ in 0..levels {
         let marked: Vec<_> = mesh
@@ -62,7 +67,7 @@ fn truncate<U: Unknowns>(finest: &Finest<U>, contact: &[bool], x: &mut [U::Value
 
 fn hierarchy(problem: &DiscreteProblem) -> Hierarchy {
     let mut hierarchy = Hierarchy::default();
-    hierarchy.read(&problem.mesh, None);
+    hierarchy.read(&problem.mesh, None, false);
     hierarchy
 }
 
@@ -212,10 +217,9 @@ fn rows_of_all_levels_are_galerkin_products() {
 }
 
 /// The preconditioner is symmetric and positive, and close to the inverse where nothing is truncated.
-fn preconditioner<U: Unknowns>(seed: Option<u64>) {
-    let problem = problem(8);
-    let h = hierarchy(&problem);
-    let finest = finest::<U>(&problem, &h);
+fn preconditioner<U: Unknowns>(problem: &DiscreteProblem, seed: Option<u64>) {
+    let h = hierarchy(problem);
+    let finest = finest::<U>(problem, &h);
     let mut random = Random(5);
     let contact = match seed {
         Some(seed) => contact(&h, &mut Random(seed)),
@@ -264,21 +268,70 @@ fn preconditioner<U: Unknowns>(seed: Option<u64>) {
 
 #[test]
 fn the_cycle_is_symmetric_and_does_not_overshoot() {
+    let problem = problem(8);
     for seed in [None].into_iter().chain((1..30).map(Some)) {
-        preconditioner::<Scalar>(seed);
-        preconditioner::<Pair>(seed);
+        preconditioner::<Scalar>(&problem, seed);
+        preconditioner::<Pair>(&problem, seed);
+    }
+    // And with aggregates below.
+    for levels in [0, 2] {
+        let problem = problem_on(LARGE_CELLS, levels);
+        for seed in [None, Some(3)] {
+            preconditioner::<Scalar>(&problem, seed);
+            preconditioner::<Pair>(&problem, seed);
+        }
     }
 }
 
+/// Cells that make an initial mesh large.
+const LARGE_CELLS: usize = 76;
+
+/// Truncation after truncation, the cycle is that of the last one alone.
+#[test]
+fn what_is_kept_of_aggregates_is_what_would_be_made_anew() {
+    fn check<U: Unknowns>() {
+        let problem = problem_on(LARGE_CELLS, 1);
+        let h = hierarchy(&problem);
+        let finest = finest::<U>(&problem, &h);
+        let mut kept = levels::<U>(&h);
+        let none = vec![false; h.len()];
+        kept.sweep(&h, &finest, &none).unwrap();
+        for seed in 0..3 {
+            let mut random = Random(seed);
+            // One quarter of the square, and a vertex here and there.
+            let contact: Vec<bool> = (0..h.len())
+                .map(|p| {
+                    let [x, y] = problem.mesh.points()[h.vertex[p] as usize];
+                    !h.fixed[p] && (random.next() < 0.01 || x > 0.1 * seed as f64 && y > 0.0)
+                })
+                .collect();
+            kept.sweep(&h, &finest, &contact).unwrap();
+            let mut fresh = levels::<U>(&h);
+            fresh.sweep(&h, &finest, &contact).unwrap();
+            let r = values::<U>(&h, &mut random);
+            let [one, other] = [&mut kept, &mut fresh].map(|levels| {
+                let mut r = r.clone();
+                let mut c = vec![U::value(|_| 0.0); r.len()];
+                levels.cycle(&h, &mut r, &mut c);
+                c
+            });
+            for (a, b) in one.iter().zip(&other) {
+                assert!((0..U::WIDTH).all(|i| U::at(*a, i) == U::at(*b, i)));
+            }
+        }
+    }
+    check::<Scalar>();
+    check::<Pair>();
+}
+
 /// Monotone cycles keep the bounds and lower the energy, each time.
-fn monotone<U: Unknowns>() {
-    let problem = problem(8);
-    let h = hierarchy(&problem);
-    let finest = finest::<U>(&problem, &h);
+fn monotone<U: Unknowns>(problem: &DiscreteProblem, seeds: u64) {
+    let h = hierarchy(problem);
+    let finest = finest::<U>(problem, &h);
     let none = vec![false; h.len()];
     let mut levels = levels::<U>(&h);
     levels.sweep(&h, &finest, &none).unwrap();
-    for seed in 0..10 {
+    for seed in 0..seeds {
         // Pressed hard nearly everywhere: coarse corrections would go far beyond the bounds.
         let mut random = Random(seed);
         let mut load = values::<U>(&h, &mut random);
@@ -329,8 +382,10 @@ fn descend<U: Unknowns>(
 
 #[test]
 fn monotone_cycles_are_monotone() {
-    monotone::<Scalar>();
-    monotone::<Pair>();
+    for (problem, seeds) in [(problem(8), 10), (problem_on(LARGE_CELLS, 0), 2)] {
+        monotone::<Scalar>(&problem, seeds);
+        monotone::<Pair>(&problem, seeds);
+    }
 }
 
 #[test]

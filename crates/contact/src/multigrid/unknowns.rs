@@ -4,6 +4,8 @@
 //! m = theta c_1 + (1 - theta) c_2, theta = d_1/(d_1 + d_2) the share of the upper membrane in the stiffness at the vertex: the
 //! vertex is *glued*. T stands for that map below; it is the identity at vertices that are free.
 
+use super::blocks::{Block, Symmetric};
+
 /// A diagonal block counts as empty below this part of the untruncated one: what is left of a coarse hat function is rounding.
 pub(crate) const EMPTY: f64 = 1e-9;
 
@@ -16,9 +18,9 @@ pub(crate) trait Unknowns: Copy + Default {
     /// Entry of the untruncated matrix: the membranes are not coupled there.
     type Plain: Copy + Default;
     /// Block between two vertices.
-    type Coupling: Copy + Default;
+    type Coupling: Block;
     /// Symmetric diagonal block, or its (pseudo-)inverse.
-    type Pivot: Copy + Default;
+    type Pivot: Symmetric<Self::Coupling>;
 
     /// Share of the upper membrane in the stiffness.
     fn share(diagonal: Self::Plain) -> f64;

@@ -3,6 +3,7 @@
 mod agreement;
 #[path = "../common/mod.rs"]
 mod common;
+mod imported;
 mod measure;
 mod problems;
 mod shapes;
