@@ -1,7 +1,7 @@
 //! Multigrid: conjugate gradients preconditioned by one symmetric cycle over the bisection hierarchy, truncated on the contact set.
 //!
 //! From the bottom up: `hierarchy` (what the births say), `unknowns` (one field or two), `finest` (the matrix of the mesh), `galerkin`
-//! (those of all levels), `coarse` (the initial mesh; `algebraic`, `aggregates` and `blocks` if it is large), `cycle`, `step` and `descent` (the method), and here the fields of a
+//! (those of all levels), `coarse` (the initial mesh; `algebraic`, `aggregates` and `blocks` if it is large), `cycle`, `step` and `descent` (the method), `workspace` (what is kept), `reduced` and here the fields of a
 //! problem one after the other. Where the tensions reduce these are the mean (linear), the gap (an obstacle problem) and sigma; else both displacements
 //! together, glued where they touch, and sigma.
 
@@ -14,14 +14,12 @@ mod descent;
 mod finest;
 mod galerkin;
 mod hierarchy;
+mod reduced;
 mod step;
 #[cfg(test)]
 mod tests;
 mod unknowns;
-
-use std::sync::{Arc, Weak};
-
-use fem_core::{Mesh, VertexId};
+mod workspace;
 
 use crate::error::SolveError;
 use crate::interior::Role;
@@ -37,6 +35,8 @@ use finest::Finest;
 use galerkin::Levels;
 use hierarchy::Hierarchy;
 use unknowns::{Pair, Scalar, Unknowns};
+use workspace::Store;
+pub use workspace::Workspace;
 
 /// Name of the method in the record.
 pub(crate) const MULTIGRID: &str = "multigrid";
@@ -47,137 +47,12 @@ const KKT: f64 = 1e-10;
 /// The inequality is solved to this part of a prescribed KKT residual: the mean takes the rest.
 const SHARE: f64 = 0.9;
 
-/// A pull so many times what the largest gap and the diagonal make of its row's rounding is a force without a closer look: a row of a mesh with
-/// ordinary shapes has magnitudes of twice its diagonal.
-const FAR: f64 = 64.0;
-
-/// The mean misses its rows by at most this part of what the KKT residual may be.
-const MEAN_SHARE: f64 = 0.25;
-
 /// With a contraction beyond this every level takes steps enough to see how far it has come.
 const SLOW: f64 = 0.25;
-
-/// A triangle is a needle if its longest side is more than this many times its height.
-const NEEDLE: f64 = 5.0;
-
-/// On large initial meshes with more than this share of needles the bisections are left aside, and all is left to aggregates.
-const NEEDLES: f64 = 0.25;
 
 /// What the part left by a first step grows by when it is handed on unseen: after about ten levels of one step each it is looked at
 /// again.
 const AGEING: f64 = 1.25;
-
-/// What a solver keeps from one solve to the next: memory above all, and what was read off a mesh while it stays the same.
-///
-/// One workspace serves the levels of one run, whose meshes descend from one another.
-#[derive(Default)]
-pub struct Workspace {
-    /// The mesh that `hierarchy` was read off.
-    mesh: Weak<Mesh>,
-    /// The order of the vertices of the initial mesh.
-    initial: Vec<u32>,
-    hierarchy: Hierarchy,
-    scalar: Store<Scalar>,
-    pair: Store<Pair>,
-}
-
-/// Matrices of a mesh and of its levels.
-#[derive(Default)]
-struct Store<U: Unknowns> {
-    /// The matrix that `finest` holds for the mesh of the workspace, if it is one.
-    held: Option<Role>,
-    finest: Finest<U>,
-    levels: Levels<U>,
-    /// Matrices of the levels for a second field beside the first.
-    beside: Levels<U>,
-}
-
-impl Workspace {
-    /// Reads the hierarchy of a mesh ahead of a solve on it, if that will be by multigrid: something to do beside the assembly.
-    pub fn read(&mut self, mesh: &Arc<Mesh>, settings: &Settings) {
-        if settings.iterates(mesh.vertex_count()) {
-            self.take(mesh);
-        }
-    }
-
-    /// Takes in a mesh; false if it has no hierarchy and is not large enough for one of aggregates.
-    fn take(&mut self, mesh: &Arc<Mesh>) -> bool {
-        if self.mesh.as_ptr() == Arc::as_ptr(mesh) {
-            return true;
-        }
-        let births = mesh.genealogy().iter().zip(mesh.boundary());
-        let inner = births.clone().filter(|(b, fixed)| b.level == 0 && !**fixed);
-        let large = inner.count() > coarse::LARGE;
-        if births.clone().all(|(birth, _)| birth.level == 0) {
-            self.initial = along_leaves(mesh);
-            if !large {
-                return false;
-            }
-        }
-        let flat = large && stretched(mesh);
-        self.hierarchy.read(mesh, Some(&self.initial), flat);
-        self.initial.clear();
-        self.initial
-            .extend_from_slice(self.hierarchy.initial_order());
-        self.mesh = Arc::downgrade(mesh);
-        self.scalar.held = None;
-        self.pair.held = None;
-        true
-    }
-}
-
-/// Whether the triangles of a mesh are needles: the relaxation of single vertices level by level does little there, since couplings along the short
-/// sides dominate. Aggregates follow the strong couplings.
-fn stretched(mesh: &Mesh) -> bool {
-    let points = mesh.points();
-    let needle = |v: &&[VertexId; 3]| {
-        let corner = v.map(|v| points[v.index()]);
-        let edge =
-            [(0, 1), (1, 2), (2, 0)].map(|(k, l)| [0, 1].map(|i| corner[l][i] - corner[k][i]));
-        let longest = edge.iter().map(|e| e[0] * e[0] + e[1] * e[1]);
-        let twice = (edge[0][0] * edge[1][1] - edge[0][1] * edge[1][0]).abs();
-        longest.fold(0.0, f64::max) > NEEDLE * twice
-    };
-    let needles = mesh.triangles().iter().filter(needle).count();
-    needles as f64 > NEEDLES * mesh.triangle_count() as f64
-}
-
-/// The vertices of a mesh in the order in which its triangles touch them first.
-fn along_leaves(mesh: &Mesh) -> Vec<u32> {
-    let mut seen = vec![false; mesh.vertex_count()];
-    let all = mesh.triangles().iter().flatten();
-    all.filter(|v| !std::mem::replace(&mut seen[v.index()], true))
-        .map(|v| v.0)
-        .collect()
-}
-
-impl<U: Unknowns> Store<U> {
-    /// Gives up what every solve writes anew: the estimators want the memory next.
-    fn rest(&mut self) {
-        self.levels.forget();
-        self.levels.spare.clear();
-        self.beside.forget();
-        self.beside.spare.clear();
-    }
-
-    /// Assembles a matrix, unless it is there.
-    fn hold(
-        &mut self,
-        role: Role,
-        hierarchy: &Hierarchy,
-        mesh: &Mesh,
-        coefficient: impl Fn(usize, usize) -> f64,
-    ) {
-        let other = self.held != Some(role);
-        if other {
-            self.finest.assemble(hierarchy, mesh, coefficient);
-            self.held = Some(role);
-        }
-        if other || self.levels.pivot.is_empty() {
-            self.levels.fit(hierarchy);
-        }
-    }
-}
 
 /// The solution by multigrid; `None` on a mesh without bisections that is small: there the initial mesh is everything.
 ///
@@ -263,151 +138,6 @@ struct Model {
 }
 
 impl Run<'_> {
-    fn reduced(
-        &self,
-        model: &Proportional,
-        store: &mut Store<Scalar>,
-    ) -> Result<Solution, SolveError> {
-        let problem = self.problem;
-        let hierarchy = self.hierarchy;
-        let tension = &problem.tension_mean[0];
-        store.hold(model.role, hierarchy, &problem.mesh, |_, t| {
-            match model.role {
-                Role::Laplacian => 1.0,
-                Role::Stiffness => tension[t],
-            }
-        });
-        let Store {
-            finest,
-            levels,
-            beside,
-            ..
-        } = store;
-        let finest = &*finest;
-        let [mean_weight, gap_weight] = model.energy_weights();
-        let mean_goal = self.goal(mean_weight, Goal::Tight(MEAN_SHARE * self.limit()));
-        let gap_goal = self.goal(gap_weight, Goal::Kkt(0.5 * SHARE * self.kkt()));
-        // Only a KKT residual is relative to the mean, and a large initial mesh keeps its factor from the one to the other.
-        let apart = matches!(gap_goal, Goal::Energy(_)) && levels.initial.is_small();
-        let (mean, gap) = if apart && self.settings.threads > 1 {
-            beside.fit(hierarchy);
-            std::thread::scope(|scope| {
-                let mean = scope.spawn(|| self.mean(model, finest, beside, mean_goal));
-                let gap = self.gap(model, finest, levels, gap_goal, 0.0);
-                let mean = mean.join().unwrap_or_else(|e| std::panic::resume_unwind(e));
-                Ok::<_, SolveError>((mean?, gap?))
-            })?
-        } else {
-            let mean = self.mean(model, finest, levels, mean_goal)?;
-            let size = mean.x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-            let gap = self.gap(model, finest, levels, gap_goal, size)?;
-            (mean, gap)
-        };
-
-        levels.forget();
-        beside.forget();
-
-        // The pull on a closed gap becomes the force, where it is more than rounding.
-        let n = hierarchy.len();
-        let largest = gap.x.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        let mut force = gap.r;
-        for p in 0..n {
-            let r = force[p];
-            let held = gap.contact[p] && !hierarchy.fixed[p] && r < 0.0;
-            force[p] = if held && {
-                let scale = model.gap_load(hierarchy.vertex[p] as usize).1;
-                // Nearly all are far above what the largest gap could leave in their row.
-                -r > FAR * ROW_ROUNDING * (scale + finest.diagonal[p] * largest)
-                    || -r > ROW_ROUNDING * (scale + row_magnitude(hierarchy, finest, &gap.x, p)[0])
-            } {
-                model.force(-r)
-            } else {
-                0.0
-            };
-        }
-        let [mut upper, mut lower] = [mean.x, gap.x];
-        for p in 0..n {
-            if !hierarchy.fixed[p] {
-                [upper[p], lower[p]] = model.displacements(upper[p], lower[p]);
-            }
-        }
-        let mut product = |i: usize, u: &[f64]| {
-            let mut y = levels.vector(n);
-            finest.multiply(hierarchy, u, &mut y);
-            finest.add_boundary(1.0, |j| problem.heights[i][j], &mut y);
-            y
-        };
-        let products = [product(0, &upper), product(1, &lower)];
-        let stiffness = model.tension();
-        let (solved, kkt_residual) = self.conclude(
-            |p| [upper[p], lower[p]],
-            |p| [0, 1].map(|i| stiffness[i] * products[i][p]),
-            |p| [0, 1].map(|i| stiffness[i] * finest.diagonal[p]),
-            &force,
-            &gap.contact,
-        );
-        levels.spare.extend(products);
-        levels.spare.extend([upper, lower, force]);
-        let (displacement, force, contact) = solved;
-        let error_squared =
-            mean_weight * mean.report.error_squared + gap_weight * gap.report.error_squared;
-        let model = Model {
-            displacement,
-            force,
-            reduction: named(problem, &contact, model.reduction),
-            contact,
-            mean: Some(mean.report),
-            inequality: gap.report,
-            kkt_residual,
-            error_squared,
-        };
-        self.finish(model, store)
-    }
-
-    /// The mean of a reduced model.
-    fn mean(
-        &self,
-        model: &Proportional,
-        finest: &Finest<Scalar>,
-        levels: &mut Levels<Scalar>,
-        goal: Goal,
-    ) -> Result<Solved<Scalar>, SolveError> {
-        levels.sweep(self.hierarchy, finest, &[])?;
-        let heights = &self.problem.heights;
-        let boundary = |j: usize| model.mean_of([0, 1].map(|i| heights[i][j]));
-        let initial = |j: usize| {
-            self.start
-                .map_or(0.0, |s| model.mean_of([0, 1].map(|i| s.displacement[i][j])))
-        };
-        let load = |j: usize| model.mean_load(j);
-        let vectors = self.vectors(finest, levels, boundary, initial, load, true);
-        self.descend(finest, levels, None, vectors, goal)
-    }
-
-    /// The gap of a reduced model; `size` is the largest mean.
-    fn gap(
-        &self,
-        model: &Proportional,
-        finest: &Finest<Scalar>,
-        levels: &mut Levels<Scalar>,
-        goal: Goal,
-        size: f64,
-    ) -> Result<Solved<Scalar>, SolveError> {
-        let heights = &self.problem.heights;
-        let boundary = |j: usize| heights[0][j] - heights[1][j];
-        let initial = |j: usize| {
-            self.start.map_or(0.0, |s| {
-                (s.displacement[0][j] - s.displacement[1][j]).max(0.0)
-            })
-        };
-        let load = |j: usize| model.gap_load(j).0;
-        let mut vectors = self.vectors(finest, levels, boundary, initial, load, false);
-        // Half the gap and the mean are bounds of the largest displacement from below.
-        vectors.boundary_size = vectors.boundary_size.max(2.0 * size);
-        let scale = |j: usize| model.gap_load(j).1;
-        self.descend(finest, levels, Some(&scale), vectors, goal)
-    }
-
     fn pair(
         &self,
         store: &mut Store<Pair>,
