@@ -233,10 +233,7 @@ impl Level {
         workspace: &mut Workspace,
         target: impl Fn(&Estimates, f64) -> Option<f64>,
     ) -> Result<(), LevelError> {
-        let Context {
-            problem, settings, ..
-        } = context;
-        if settings.solve.tolerance != Tolerance::Balanced {
+        if context.settings.solve.tolerance != Tolerance::Balanced {
             return Ok(());
         }
         for _ in 0..ROUNDS {
@@ -246,22 +243,26 @@ impl Level {
             let Some(goal) = target(&self.estimates, algebraic) else {
                 return Ok(());
             };
-            let clock = Instant::now();
             self.solve_on(context, goal, workspace)?;
-            self.record.seconds_solve += clock.elapsed().as_secs_f64();
-            let clock = Instant::now();
-            self.estimates = Estimates::of(
-                &self.mesh,
-                &self.discrete,
-                self.moments.as_ref(),
-                &self.solution,
-                problem,
-                settings,
-                self.forecast,
-            )?;
-            self.renew(context)?;
-            self.record.seconds_estimate += clock.elapsed().as_secs_f64();
+            self.estimate_again(context)?;
         }
+        Ok(())
+    }
+
+    /// Estimates the present solution, and makes the record anew.
+    fn estimate_again(&mut self, context: Context<'_>) -> Result<(), LevelError> {
+        let clock = Instant::now();
+        self.estimates = Estimates::of(
+            &self.mesh,
+            &self.discrete,
+            self.moments.as_ref(),
+            &self.solution,
+            context.problem,
+            context.settings,
+            self.forecast,
+        )?;
+        self.renew(context)?;
+        self.record.seconds_estimate += clock.elapsed().as_secs_f64();
         Ok(())
     }
 
@@ -272,6 +273,7 @@ impl Level {
         goal: f64,
         workspace: &mut Workspace,
     ) -> Result<(), LevelError> {
+        let clock = Instant::now();
         let solve = contact::Settings {
             energy_target: Some(goal),
             sigma: needs_sigma(context.problem, context.settings),
@@ -281,6 +283,7 @@ impl Level {
         let mut better = contact::solve_in(&self.discrete, &solve, Some(&start), workspace)?;
         better.info.iterations += self.solution.info.iterations;
         self.solution = better;
+        self.record.seconds_solve += clock.elapsed().as_secs_f64();
         Ok(())
     }
 
@@ -295,7 +298,6 @@ impl Level {
         let Context {
             problem, settings, ..
         } = context;
-        let clock = Instant::now();
         let leak = |leak: f64| leak * (self.mesh.vertex_count() as f64).sqrt();
         let share = |size: f64| 0.5 * SETTLED * size;
         let goal = (self.estimates.error_size.map(share))
@@ -308,23 +310,11 @@ impl Level {
         {
             self.solve_on(context, goal, workspace)?;
         }
-        self.record.seconds_solve += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         self.moments = Some(moments(problem, &self.discrete)?);
         self.forecast = None;
         self.record.seconds_assemble += clock.elapsed().as_secs_f64();
-        let clock = Instant::now();
-        self.estimates = Estimates::of(
-            &self.mesh,
-            &self.discrete,
-            self.moments.as_ref(),
-            &self.solution,
-            problem,
-            settings,
-            None,
-        )?;
-        self.renew(context)?;
-        self.record.seconds_estimate += clock.elapsed().as_secs_f64();
+        self.estimate_again(context)?;
         self.stamp(context);
         Ok(())
     }
