@@ -79,6 +79,7 @@ impl Case {
             load: fields(&LOAD),
             tension: fields(&TENSION),
             moments: &moments,
+            loads: &self.discrete.loads,
             tension_mean: mean,
             displacement: &self.solution.displacement,
             force: &self.solution.force,

@@ -6,6 +6,7 @@ use contact::{Settings as SolveSettings, Solution, Solver, Tolerance};
 use estimate::certificate::POINCARE;
 use estimate::{Certificate, Given, Grade, Moments, TrueErrors, certify};
 use fem_core::Children;
+use fem_core::integrate::load_pair;
 use fem_core::scale::times_power_of_two;
 
 use crate::cases::{Grid, levels, on, solve, uniform};
@@ -31,11 +32,14 @@ fn of(
         Some(moments) => moments.clone(),
         None => Moments::of(&level.mesh, load, tension).expect("good data"),
     };
+    // Those of the level may come from a file, without moments.
+    let loads = load_pair(&level.mesh, load).expect("good data");
     let given = Given {
         mesh: &level.mesh,
         load,
         tension,
         moments: &moments,
+        loads: &loads,
         tension_mean: mean,
         displacement: &solution.displacement,
         force: &solution.force,
@@ -283,6 +287,7 @@ fn certificate_marks_like_the_true_error() {
                         load: [&*problem.load[0], &*problem.load[1]],
                         tension: [&*problem.tension[0], &*problem.tension[1]],
                         moments: &moments,
+                        loads: &discrete.loads,
                         tension_mean: &discrete.tension_mean,
                         displacement: &solution.displacement,
                         force: &solution.force,

@@ -81,23 +81,62 @@ pub fn discretise_carried(
     assemble(problem, mesh, Some(before), loads)
 }
 
-/// The moments of the data that the certificate needs, from the same points as the loads.
+/// The moments of the data that a certificate needs, from the same points as the loads.
 ///
 /// # Errors
 /// As [`discretise`].
 pub fn moments(problem: &Problem, discrete: &DiscreteProblem) -> Result<Moments, DataError> {
-    let load = [&*problem.load[0], &*problem.load[1]];
-    let tension = [&*problem.tension[0], &*problem.tension[1]];
-    let reference = match discrete.loads[0].reference() {
-        Some(reference) => reference,
-        None => Reference::of(&problem.mesh, load)?,
-    };
+    let fields = Fields::of(problem, discrete)?;
+    let Fields { load, tension, .. } = fields;
+    let mesh = &discrete.mesh;
     Ok(Moments::relative_to(
-        &reference,
-        &discrete.mesh,
+        &fields.reference,
+        mesh,
         load,
         tension,
     )?)
+}
+
+/// The same, with samples only where a certificate of a solution with these action forces needs them.
+///
+/// # Errors
+/// As [`discretise`].
+pub(crate) fn moments_near(
+    problem: &Problem,
+    discrete: &DiscreteProblem,
+    force: &[f64],
+) -> Result<Moments, DataError> {
+    let fields = Fields::of(problem, discrete)?;
+    let Fields { load, tension, .. } = fields;
+    let mesh = &discrete.mesh;
+    Ok(Moments::near(
+        &fields.reference,
+        mesh,
+        load,
+        tension,
+        force,
+    )?)
+}
+
+/// The data of a problem and what its elements are judged by.
+struct Fields<'a> {
+    reference: Reference,
+    load: [&'a dyn Field; 2],
+    tension: [&'a dyn Field; 2],
+}
+
+impl<'a> Fields<'a> {
+    fn of(problem: &'a Problem, discrete: &DiscreteProblem) -> Result<Self, FieldError> {
+        let load = [&*problem.load[0], &*problem.load[1]];
+        Ok(Fields {
+            reference: match discrete.loads[0].reference() {
+                Some(reference) => reference,
+                None => Reference::of(&problem.mesh, load)?,
+            },
+            load: [load[0], load[1]],
+            tension: [&*problem.tension[0], &*problem.tension[1]],
+        })
+    }
 }
 
 fn assemble(

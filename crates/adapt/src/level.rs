@@ -7,8 +7,8 @@ use contact::{DiscreteProblem, Solution, Start, Tolerance, Workspace};
 use estimate::{Grade, Moments};
 use fem_core::{Mesh, TriangleId, parallel};
 
-use crate::discretise::{Before, DataError, discretise, discretise_carried, moments};
-use crate::estimates::Estimates;
+use crate::discretise::{Before, DataError, discretise, discretise_carried, moments_near};
+use crate::estimates::{self, Estimates};
 use crate::output::memory::peak_memory_mb;
 use crate::problem::Problem;
 use crate::record::LevelRecord;
@@ -43,6 +43,15 @@ pub const BALANCE: f64 = 0.1;
 /// smaller costs an iterative solver one step.
 pub const SETTLED: f64 = 0.01;
 
+/// Predictions of eta and eta_alg may be so much too large.
+const AHEAD: f64 = 0.8;
+
+/// After several steps eta_alg is this part of what the quotient after a single one lets expect: the rough parts of the error go first.
+const LEAK: f64 = 0.125;
+
+/// An algebraic error up to so many times what was to be gone for is left as it is: eta_alg is looked at next in any case.
+const CLOSE: f64 = 1.5;
+
 /// From so many vertices on a run that the certificate drives goes by cheap indicators as long as its goal is far. Below, the certificate
 /// of all levels together takes a few milliseconds.
 const CHEAP_FROM: usize = 10_000;
@@ -76,6 +85,13 @@ impl Forecast {
         }
     }
 
+    /// The algebraic error at which eta_alg is expected to be half of what it may be on a mesh where the error has this size.
+    fn settled(self, size: f64, mesh: &Mesh) -> Option<f64> {
+        let share = 0.5 * SETTLED * size;
+        self.leak
+            .map(|leak| share / (LEAK * leak * (mesh.vertex_count() as f64).sqrt()))
+    }
+
     /// The quotient that a level is to be judged by instead of its certificate, if it is to be.
     fn on(self, mesh: &Mesh) -> Option<f64> {
         let vertices = mesh.vertex_count();
@@ -92,8 +108,8 @@ const ROUNDS: usize = 8;
 struct Begin {
     number: usize,
     start: Option<Start>,
-    /// The error to be expected.
-    expected: Option<f64>,
+    /// The algebraic error to go for.
+    target: Option<f64>,
     forecast: Option<f64>,
     seconds_refine: f64,
 }
@@ -118,12 +134,14 @@ impl Level {
         Level::on(mesh, context, discrete, Begin::default(), workspace)
     }
 
-    /// Refines the marked triangles, carries the solution over, solves and estimates.
+    /// Refines the marked triangles, carries the solution over, solves and estimates. `last` is told this level, the new mesh and the error expected there, and says
+    /// whether the new level may be the last.
     pub(crate) fn refine(
         &self,
         marked: &[TriangleId],
         context: Context<'_>,
         forecast: Forecast,
+        last: impl FnOnce(&Level, &Mesh, f64) -> bool,
         workspace: &mut Workspace,
     ) -> Result<Level, LevelError> {
         let settings = context.settings;
@@ -139,11 +157,20 @@ impl Level {
         // First-order elements: the error goes like the root of the number of vertices at best.
         let growth = self.mesh.vertex_count() as f64 / mesh.vertex_count() as f64;
         let expected = self.estimates.error_size.map(|size| size * growth.sqrt());
+        let forecast_here = forecast.on(&mesh);
+        let target = expected.map(|size| {
+            // Where the certificate will be asked for, the solver goes at once as far as that wants it.
+            let settled = (settings.solve.tolerance == Tolerance::Balanced)
+                .then(|| forecast.settled(size, &mesh))
+                .flatten()
+                .filter(|_| forecast_here.is_some() && last(self, &mesh, size));
+            settled.unwrap_or(BALANCE * size)
+        });
         let begin = Begin {
             number: self.number + 1,
             start: Some(carried),
-            expected,
-            forecast: forecast.on(&mesh),
+            target,
+            forecast: forecast_here,
             seconds_refine: clock.elapsed().as_secs_f64(),
         };
         let before = Before {
@@ -169,27 +196,28 @@ impl Level {
         } = context;
         let clock = Instant::now();
         let certified = settings.estimate.wants(Estimator::Certified) && begin.forecast.is_none();
-        let assemble = || {
-            let discrete = discrete(&mesh)?;
-            let moments = certified.then(|| moments(problem, &discrete)).transpose()?;
-            Ok::<_, DataError>((discrete, moments))
-        };
-        let (discrete, moments) = if settings.solve.threads > 1 {
+        let discrete = if settings.solve.threads > 1 {
             let threads = settings.solve.threads;
-            parallel::both(threads, || workspace.read(&mesh, &settings.solve), assemble).1?
+            let read = || workspace.read(&mesh, &settings.solve);
+            parallel::both(threads, read, || discrete(&mesh)).1?
         } else {
-            assemble()?
+            discrete(&mesh)?
         };
         let seconds_assemble = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let solve = contact::Settings {
-            energy_target: begin.expected.map(|size| BALANCE * size),
+            energy_target: begin.target,
             sigma: needs_sigma(problem, settings),
             ..settings.solve
         };
         let solution = contact::solve_in(&discrete, &solve, begin.start.as_ref(), workspace)?;
         drop(begin.start);
         let seconds_solve = clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        let moments = certified
+            .then(|| moments_near(problem, &discrete, &solution.force))
+            .transpose()?;
+        let seconds_assemble = seconds_assemble + clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let estimates = Estimates::of(
             &mesh,
@@ -298,23 +326,49 @@ impl Level {
         let Context {
             problem, settings, ..
         } = context;
-        let leak = |leak: f64| leak * (self.mesh.vertex_count() as f64).sqrt();
-        let share = |size: f64| 0.5 * SETTLED * size;
-        let goal = (self.estimates.error_size.map(share))
-            .zip(forecast.leak.map(leak))
-            .map(|(share, leak)| share / leak);
+        let size = self.estimates.error_size;
+        let goal = size.and_then(|size| forecast.settled(size, &self.mesh));
+        let mut estimated = true;
         let info = &self.solution.info;
         if let (Some(goal), Some(algebraic)) = (goal, info.algebraic_error)
             && settings.solve.tolerance == Tolerance::Balanced
-            && algebraic > goal
+            && algebraic > CLOSE * goal
         {
             self.solve_on(context, goal, workspace)?;
+            estimated = false;
         }
         let clock = Instant::now();
-        self.moments = Some(moments(problem, &self.discrete)?);
+        let mut moments = moments_near(problem, &self.discrete, &self.solution.force)?;
         self.forecast = None;
         self.record.seconds_assemble += clock.elapsed().as_secs_f64();
-        self.estimate_again(context)?;
+        // eta_alg by itself is cheap: what is missing is made up for before the certificate.
+        for _ in 0..ROUNDS {
+            let (Some(size), Some(algebraic)) = (
+                self.estimates.error_size,
+                self.solution.info.algebraic_error,
+            ) else {
+                break;
+            };
+            let clock = Instant::now();
+            let (mesh, discrete) = (&self.mesh, &self.discrete);
+            let found = estimates::algebraic(mesh, discrete, &moments, &self.solution, problem)?;
+            self.record.seconds_estimate += clock.elapsed().as_secs_f64();
+            let share = AHEAD * SETTLED * size;
+            if settings.solve.tolerance != Tolerance::Balanced || found <= share {
+                break;
+            }
+            self.solve_on(context, AHEAD * algebraic * share / found, workspace)?;
+            estimated = false;
+            let load = [&*problem.load[0], &*problem.load[1]];
+            let tension = [&*problem.tension[0], &*problem.tension[1]];
+            moments.cover(&self.mesh, load, tension, &self.solution.force)?;
+        }
+        self.moments = Some(moments);
+        if estimated {
+            self.add_certificate(Grade::Rt0, context)?;
+        } else {
+            self.estimate_again(context)?;
+        }
         self.stamp(context);
         Ok(())
     }
@@ -339,6 +393,13 @@ impl Level {
     ///
     /// Returns the quotient of the sharp bound and the one before; 1 where both vanish.
     pub(crate) fn sharpen(&mut self, context: Context<'_>) -> Result<f64, LevelError> {
+        let ratio = self.add_certificate(Grade::Rt1, context)?;
+        self.stamp(context);
+        Ok(ratio)
+    }
+
+    /// Makes a certificate of the present solution beside the other estimates; the quotient of the new bound and the one before.
+    fn add_certificate(&mut self, grade: Grade, context: Context<'_>) -> Result<f64, LevelError> {
         let Context {
             problem, settings, ..
         } = context;
@@ -353,12 +414,11 @@ impl Level {
             moments,
             solution,
             problem,
-            Grade::Rt1,
+            grade,
             settings.estimate.estimator == Estimator::Certified,
         )?;
         self.renew(context)?;
         self.record.seconds_estimate += clock.elapsed().as_secs_f64();
-        self.stamp(context);
         Ok(ratio)
     }
 

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use contact::{SolveError, Workspace};
 use fem_core::scale::times_power_of_two;
-use fem_core::{FieldError, MeshError, Scale};
+use fem_core::{FieldError, Mesh, MeshError, Scale};
 
 use crate::discretise::DataError;
 use crate::estimates::bound_unit;
@@ -61,7 +61,12 @@ pub fn run(
         }
         let marked = mark(&level.estimates.marking, &settings.mark); // MARK
         level.estimates.marking = Vec::new();
-        level = match level.refine(&marked, context, forecast, &mut workspace) {
+        let last = |before: &Level, mesh: &Mesh, expected: f64| {
+            let full = |limit: usize| mesh.vertex_count() >= limit;
+            settings.stop.vertices.is_some_and(full)
+                || reached(settings, before, problem.scale, NEAR * expected).is_some()
+        };
+        level = match level.refine(&marked, context, forecast, last, &mut workspace) {
             // REFINE, SOLVE, ESTIMATE
             Ok(next) => next,
             Err(cause) => {

@@ -36,7 +36,8 @@ pub mod sweep;
 
 pub use action::{extend_to_boundary, nodal_action};
 pub use certificate::{
-    BoundaryOscillation, Certificate, Given, Grade, Moments, boundary_oscillation, certify,
+    BoundaryOscillation, Certificate, Given, Grade, Moments, algebraic, boundary_oscillation,
+    certify,
 };
 pub use contact_set::{ContactSet, contact_set};
 pub use efficiency::{Efficiency, efficiency};

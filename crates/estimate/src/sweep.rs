@@ -42,68 +42,99 @@ struct Corner {
     action: f64,
 }
 
-/// The data of the elements, as the pass reads them.
+/// The data of the elements, as the pass reads them; those of both membranes at once.
 trait Data {
     /// Whether the loads deviate from their means.
     const VARYING: bool;
 
     /// mu_iK.
-    fn tension(&self, i: usize, t: usize) -> f64;
+    fn tensions(&self, t: usize) -> [f64; 2];
 
     /// 1/mu_iK.
-    fn softness(&self, i: usize, t: usize) -> f64;
+    fn softness(&self, t: usize) -> [f64; 2];
 
     /// 1/max(mu_iK, mu_iK') for two neighbours.
-    fn stiffer(&self, i: usize, t: usize, s: usize) -> f64;
+    fn stiffer(&self, t: usize, s: usize) -> [f64; 2];
 
     /// f_ih.
-    fn mean(&self, i: usize, t: usize) -> f64;
+    fn means(&self, t: usize) -> [f64; 2];
 }
 
-/// Loads and tensions that are the same everywhere.
-struct Constants {
+/// Tensions that are the same everywhere.
+struct Even {
     tension: [f64; 2],
     softness: [f64; 2],
-    load: [f64; 2],
 }
 
-impl Constants {
-    fn of(problem: &DiscreteProblem) -> Option<Constants> {
+impl Even {
+    fn of(problem: &DiscreteProblem) -> Option<Even> {
         let [Some(m1), Some(m2)] = problem.tension_mean.each_ref().map(ElementValues::same) else {
             return None;
         };
-        let [Some(f1), Some(f2)] = problem.loads.each_ref().map(Loads::same) else {
-            return None;
-        };
-        Some(Constants {
+        Some(Even {
             tension: [m1, m2],
             softness: [1.0 / m1, 1.0 / m2],
-            load: [f1, f2],
         })
     }
+}
+
+/// Loads too that are the same everywhere.
+struct Constants {
+    even: Even,
+    load: [f64; 2],
 }
 
 impl Data for Constants {
     const VARYING: bool = false;
 
     #[inline(always)]
-    fn tension(&self, i: usize, _: usize) -> f64 {
-        self.tension[i]
+    fn tensions(&self, _: usize) -> [f64; 2] {
+        self.even.tension
     }
 
     #[inline(always)]
-    fn softness(&self, i: usize, _: usize) -> f64 {
-        self.softness[i]
+    fn softness(&self, _: usize) -> [f64; 2] {
+        self.even.softness
     }
 
     #[inline(always)]
-    fn stiffer(&self, i: usize, _: usize, _: usize) -> f64 {
-        self.softness[i]
+    fn stiffer(&self, _: usize, _: usize) -> [f64; 2] {
+        self.even.softness
     }
 
     #[inline(always)]
-    fn mean(&self, i: usize, _: usize) -> f64 {
-        self.load[i]
+    fn means(&self, _: usize) -> [f64; 2] {
+        self.load
+    }
+}
+
+/// Constant tensions and any loads.
+struct Loaded<'a> {
+    even: Even,
+    loads: &'a [Loads; 2],
+}
+
+impl Data for Loaded<'_> {
+    const VARYING: bool = true;
+
+    #[inline(always)]
+    fn tensions(&self, _: usize) -> [f64; 2] {
+        self.even.tension
+    }
+
+    #[inline(always)]
+    fn softness(&self, _: usize) -> [f64; 2] {
+        self.even.softness
+    }
+
+    #[inline(always)]
+    fn stiffer(&self, _: usize, _: usize) -> [f64; 2] {
+        self.even.softness
+    }
+
+    #[inline(always)]
+    fn means(&self, t: usize) -> [f64; 2] {
+        self.loads.each_ref().map(|f| f.mean(t))
     }
 }
 
@@ -111,24 +142,24 @@ impl Data for &DiscreteProblem {
     const VARYING: bool = true;
 
     #[inline(always)]
-    fn tension(&self, i: usize, t: usize) -> f64 {
-        self.tension_mean[i][t]
+    fn tensions(&self, t: usize) -> [f64; 2] {
+        self.tension_mean.each_ref().map(|mean| mean[t])
     }
 
     #[inline(always)]
-    fn softness(&self, i: usize, t: usize) -> f64 {
-        1.0 / self.tension_mean[i][t]
+    fn softness(&self, t: usize) -> [f64; 2] {
+        self.tensions(t).map(|mu| 1.0 / mu)
     }
 
     #[inline(always)]
-    fn stiffer(&self, i: usize, t: usize, s: usize) -> f64 {
-        let mean = &self.tension_mean[i];
-        1.0 / mean[t].max(mean[s])
+    fn stiffer(&self, t: usize, s: usize) -> [f64; 2] {
+        let (here, there) = (self.tensions(t), self.tensions(s));
+        [0, 1].map(|i| 1.0 / here[i].max(there[i]))
     }
 
     #[inline(always)]
-    fn mean(&self, i: usize, t: usize) -> f64 {
-        self.loads[i].mean(t)
+    fn means(&self, t: usize) -> [f64; 2] {
+        self.loads.each_ref().map(|f| f.mean(t))
     }
 }
 
@@ -141,17 +172,36 @@ pub fn sweep(
     threads: usize,
 ) -> Sweep {
     let level = (mesh, problem, solution, threads);
-    match (Constants::of(problem), residual) {
-        (Some(data), true) => pass::<true, _>(level, &data),
-        (Some(data), false) => pass::<false, _>(level, &data),
-        (None, true) => pass::<true, _>(level, &problem),
-        (None, false) => pass::<false, _>(level, &problem),
+    let Some(even) = Even::of(problem) else {
+        return wanted(level, residual, &problem);
+    };
+    match problem.loads.each_ref().map(Loads::same) {
+        [Some(f), Some(g)] => {
+            let load = [f, g];
+            wanted(level, residual, &Constants { even, load })
+        }
+        _ => {
+            let loads = &problem.loads;
+            wanted(level, residual, &Loaded { even, loads })
+        }
+    }
+}
+
+/// What the pass is made on.
+type Given<'a> = (&'a Mesh, &'a DiscreteProblem, &'a Solution, usize);
+
+/// The pass with or without the estimator.
+fn wanted<D: Data + Sync>(level: Given<'_>, residual: bool, data: &D) -> Sweep {
+    if residual {
+        pass::<true, _>(level, data)
+    } else {
+        pass::<false, _>(level, data)
     }
 }
 
 /// The pass; `RESIDUAL` says whether the estimator is computed.
 fn pass<const RESIDUAL: bool, D: Data + Sync>(
-    (mesh, problem, solution, threads): (&Mesh, &DiscreteProblem, &Solution, usize),
+    (mesh, problem, solution, threads): Given<'_>,
     data: &D,
 ) -> Sweep {
     let (corners, work) = corners::<RESIDUAL>(mesh, problem, solution);
@@ -234,10 +284,13 @@ struct Element {
     area: f64,
     /// Edge k is opposite to corner k; all run counter-clockwise.
     edges: [[f64; 2]; 3],
-    flux: [[f64; 2]; 2],
+    flux: Flux,
     /// int_K mu_i |grad u_i|^2.
     energy: [f64; 2],
 }
+
+/// mu_i grad u_i: both fields side by side for every axis, so that one instruction works on both.
+type Flux = [[f64; 2]; 2];
 
 impl<D: Data> Blocks<'_, D> {
     #[inline(always)]
@@ -247,18 +300,17 @@ impl<D: Data> Blocks<'_, D> {
         let twice = edges[2][1] * edges[1][0] - edges[2][0] * edges[1][1];
         let area = 0.5 * twice;
         let over = 1.0 / twice;
-        let mut flux = [[0.0; 2]; 2];
-        let mut energy = [0.0; 2];
-        for i in 0..2 {
+        let difference = |p: &Corner| {
             // Differences first: a large common height must not cost digits.
-            let d1 = (b.displacement[i] - a.displacement[i]) * over;
-            let d2 = (c.displacement[i] - a.displacement[i]) * over;
-            let x = -(d1 * edges[1][1] + d2 * edges[2][1]);
-            let y = d1 * edges[1][0] + d2 * edges[2][0];
-            let mu = self.data.tension(i, t);
-            flux[i] = [mu * x, mu * y];
-            energy[i] = area * (flux[i][0] * x + flux[i][1] * y);
-        }
+            let d = [0, 1].map(|i| p.displacement[i] - a.displacement[i]);
+            d.map(|d| d * over)
+        };
+        let (d1, d2) = (difference(b), difference(c));
+        let tension = self.data.tensions(t);
+        let x = [0, 1].map(|i| -(d1[i] * edges[1][1] + d2[i] * edges[2][1]));
+        let y = [0, 1].map(|i| d1[i] * edges[1][0] + d2[i] * edges[2][0]);
+        let flux = [x, y].map(|g| [0, 1].map(|i| tension[i] * g[i]));
+        let energy = [0, 1].map(|i| area * (flux[0][i] * x[i] + flux[1][i] * y[i]));
         Element {
             area,
             edges,
@@ -281,7 +333,7 @@ impl<D: Data> Blocks<'_, D> {
             .iter()
             .zip(&neighbours[block.clone()]);
         let corners = |t: usize| triangles[t].map(|j| &self.corners[j.index()]);
-        let mut fluxes: Vec<[[f64; 2]; 2]> = Vec::with_capacity(block.len());
+        let mut fluxes: Vec<Flux> = Vec::with_capacity(block.len());
         let mut sums = Sums::default();
         for (k, (v, around)) in own.enumerate() {
             let t = begin + k;
@@ -293,15 +345,15 @@ impl<D: Data> Blocks<'_, D> {
             element.energy.iter().for_each(|e| sums.energy += e);
             let [l0, l1, l2] = edges.map(|e| e[0] * e[0] + e[1] * e[1]);
             let h2 = larger(larger(l0, l1), l2);
-            let means = [data.mean(0, t), data.mean(1, t)];
-            let softness = [data.softness(0, t), data.softness(1, t)];
+            let means = data.means(t);
+            let softness = data.softness(t);
             let weight = h2 * area;
             let [f, g] = means.map(|f| f * f);
             sums.largest = larger(sums.largest, weight * (f + g));
             let weighted = weight * (f * softness[0] + g * softness[1]);
             sums.weighted_largest = larger(sums.weighted_largest, weighted);
             if self.varying {
-                let [f, g] = [0, 1].map(|i| problem.loads[i].deviation_squared(t));
+                let [f, g] = problem.loads.each_ref().map(|f| f.deviation_squared(t));
                 oscillation[k] = h2 * (f + g);
                 weighted_oscillation[k] = h2 * (f * softness[0] + g * softness[1]);
             }
@@ -312,8 +364,8 @@ impl<D: Data> Blocks<'_, D> {
             let mut square = 0.0;
             let mut terms = [0.0; 2];
             for l in actions {
-                terms[0] += (means[0] + l) * (means[0] + l);
-                terms[1] += (means[1] - l) * (means[1] - l);
+                let sides = [means[0] + l, means[1] - l];
+                terms = [0, 1].map(|i| terms[i] + sides[i] * sides[i]);
             }
             square += weight / 3.0 * (softness[0] * terms[0] + softness[1] * terms[1]);
             if actions != [0.0; 3] {
@@ -334,11 +386,12 @@ impl<D: Data> Blocks<'_, D> {
                 } else {
                     self.element(s, corners(s)).flux
                 };
-                let mut half = 0.0;
-                for i in 0..2 {
-                    let jump = (q[i][0] - flux[i][0]) * edge[1] - (q[i][1] - flux[i][1]) * edge[0];
-                    half += 0.5 * jump * jump * data.stiffer(i, t, s);
-                }
+                let stiffer = data.stiffer(t, s);
+                let [first, second] = [0, 1].map(|i| {
+                    let jump = (q[0][i] - flux[0][i]) * edge[1] - (q[1][i] - flux[1][i]) * edge[0];
+                    0.5 * jump * jump * stiffer[i]
+                });
+                let half = first + second;
                 square += half;
                 if place < k {
                     squares[place] += half;

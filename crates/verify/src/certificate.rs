@@ -118,6 +118,7 @@ pub(crate) fn certificate(
         load,
         tension,
         moments,
+        loads: &level.loads,
         tension_mean: &level.tension,
         displacement: &level.displacement,
         force: &level.force,

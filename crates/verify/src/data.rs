@@ -71,7 +71,7 @@ impl<'a> Discrete<'a> {
         let reference = Reference::of(&problem.mesh, load)?;
         let tension = [&*problem.tension[0], &*problem.tension[1]];
         let moments = certified
-            .then(|| Moments::relative_to(&reference, mesh, load, tension))
+            .then(|| Moments::near(&reference, mesh, load, tension, &nodal.force))
             .transpose()?;
         let pair = |fields: &[std::sync::Arc<dyn Field>; 2]| {
             Ok::<_, FieldError>([means(mesh, &*fields[0])?, means(mesh, &*fields[1])?])

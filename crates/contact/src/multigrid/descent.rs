@@ -52,7 +52,7 @@ const SEEN: f64 = 0.1;
 const SMALL: usize = 2000;
 
 /// A first step is never believed to leave less than this part of the squared error.
-const LEAST_LEFT: f64 = 0.02;
+const LEAST_LEFT: f64 = 0.01;
 
 /// When an iterate is good enough.
 #[derive(Clone, Copy, Debug)]

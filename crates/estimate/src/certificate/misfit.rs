@@ -1,7 +1,8 @@
 //! From reconstructed fluxes to ||mu^(-1/2)(s_i + mu_i grad u_ih)||_K and ||f_i +- lambda_h - r_i - div s_i||_K.
 
 use fem_core::integrate::{
-    Control, Integrand, Judgement, Partition, Piece, WHOLE_PART, integrate, squared_error,
+    Control, Integrand, Judgement, Partition, Piece, Reference, WHOLE_PART, integrate,
+    squared_error,
 };
 use fem_core::quadrature::{POINTS, affine_misfit};
 use fem_core::{FieldError, Mesh, Samples, TriangleId};
@@ -108,7 +109,7 @@ impl Norms {
         let mut norms = Norms::default();
         for i in 0..2 {
             norms.misfit[i] = squares[t][i] / given.tension_mean[i][t];
-            if given.moments.uniform(t) {
+            if given.moments.uniform(given.loads, t) {
                 norms.remainder[i] = fluxes.uniform_remainder(t, i, area, shares);
             }
         }
@@ -127,7 +128,11 @@ const CONTROL: Control = Control {
 /// Accuracy of the integrals elsewhere: a piece may be wrong by this part of what its element contributes.
 const LOCAL_TOLERANCE: f64 = 1e-3;
 
-/// Evaluates the norms where data vary: in closed form where the data are constant in an element, else by quadrature.
+/// An element's load is smooth if it differs from its best affine fit by at most this part of what the divergence leaves of the fit.
+const SMOOTH: f64 = 0.1;
+
+/// Evaluates the norms where data vary: in closed form where the data are constant in an element, by a bound as good where the load is smooth and the
+/// membranes are apart, else by quadrature.
 ///
 /// `squares` holds ||tau||^2 for every element and membrane. Where the tensions are constants and the loads smooth, seven samples of an element do;
 /// else its six parts are sampled.
@@ -147,6 +152,22 @@ pub(super) fn norms(
     }
     let varying = given.tension.map(|f| f.constant().is_none());
     let exact = norms.clone();
+    let mut known = vec![false; norms.len()];
+    if varying == [false; 2] {
+        for (t, id) in mesh.triangle_ids().enumerate() {
+            known[t] = moments.uniform(given.loads, t);
+            if !known[t]
+                && let Some(squares) = smooth_remainder(given, shares, fluxes, t, mesh.area(id))
+            {
+                norms[t].remainder = squares;
+                known[t] = true;
+            }
+        }
+    }
+    let reference = (varying == [false; 2]).then(|| Reference {
+        area: fem_core::norms::area(mesh),
+        magnitude: [exact.iter().flat_map(|n| n.misfit).sum(), 0.0],
+    });
     for i in (0..2).filter(|&i| varying[i]) {
         norms.iter_mut().for_each(|n| n.misfit[i] = 0.0);
     }
@@ -159,10 +180,77 @@ pub(super) fn norms(
         varying,
         rule: DualRule::new(),
         exact,
+        known,
+        reference,
         norms,
     };
     integrate(mesh, CONTROL, &mut sampled)?;
     Ok(sampled.norms)
+}
+
+/// Bounds for the squared remainders of an element where the membranes are apart and both loads are smooth; `None` elsewhere.
+///
+/// With the best affine fit p of a load f, known from its moments, ||f - div s|| <= ||p - div s|| + ||f - p||. The divergence is affine plus constants on the
+/// shares of the dual cells, so that the first norm has a closed form; the second one follows from ||f - f_h||, since p - f_h is orthogonal to f - p.
+fn smooth_remainder(
+    given: &Given<'_>,
+    shares: &Shares,
+    fluxes: &dyn Reconstruction,
+    t: usize,
+    area: f64,
+) -> Option<[f64; 2]> {
+    let v = given.mesh.triangles()[t].map(|j| j.index());
+    if v.iter().any(|&j| shares.theta[j] != 0.0) {
+        return None;
+    }
+    let mut squares = [0.0; 2];
+    for i in 0..2 {
+        let hats = given.loads[i].moments(t, area).map(|m| m / area);
+        let mean = hats[0] + hats[1] + hats[2];
+        // The inverse of the mass matrix.
+        let slope = hats.map(|m| 12.0 * m - 4.0 * mean);
+        let affine_part = area / 12.0 * slope.iter().map(|d| d * d).sum::<f64>();
+        let bent = (given.loads[i].deviation_squared(t) - affine_part).max(0.0);
+        let affine = fluxes.affine(t, i).unwrap_or([0.0; 3]);
+        let constants = constants(fluxes, shares, t, i, v);
+        let fit = [0, 1, 2].map(|k| mean + slope[k] - affine[k]);
+        let square = on_cells_squared(fit, constants, area);
+        if bent > SMOOTH * SMOOTH * square {
+            return None;
+        }
+        squares[i] = (square.sqrt() + bent.sqrt()).powi(2);
+    }
+    Some(squares)
+}
+
+/// ||p - sum_k c_k chi_Dk||^2 on an element, for an affine function p by its values at the corners.
+fn on_cells_squared(p: [f64; 3], c: [f64; 3], area: f64) -> f64 {
+    let mean = (p[0] + p[1] + p[2]) / 3.0;
+    let (p, c) = (p.map(|p| p - mean), c.map(|c| c - mean));
+    let mut sum = 0.0;
+    for k in 0..3 {
+        // The integrals of the hat functions over D_k are 22/108 and 7/108 of the area; the values of p sum to zero.
+        let across = 15.0 / 108.0 * p[k];
+        sum += p[k] * p[k] / 12.0 - 2.0 * c[k] * across + c[k] * c[k] / 3.0;
+    }
+    area * sum.max(0.0)
+}
+
+/// What of the divergence of s_i (and of the action and the residual) is constant on the shares of the dual cells.
+fn constants(
+    fluxes: &dyn Reconstruction,
+    shares: &Shares,
+    t: usize,
+    i: usize,
+    corners: [usize; 3],
+) -> [f64; 3] {
+    let mut constants = fluxes.on_cells(t, i);
+    if fluxes.lacks_cells() {
+        for (c, j) in constants.iter_mut().zip(corners) {
+            *c -= shares.cell(i, j);
+        }
+    }
+    constants
 }
 
 /// Norms under way.
@@ -177,6 +265,10 @@ struct Sampled<'a> {
     rule: DualRule,
     /// Closed forms, where they hold.
     exact: Vec<Norms>,
+    /// Where both norms are known without samples.
+    known: Vec<bool>,
+    /// What jumps are relative to: the whole, which is more than the elements that are sampled.
+    reference: Option<Reference>,
     norms: Vec<Norms>,
 }
 
@@ -191,12 +283,7 @@ impl Sampled<'_> {
     fn remainder(&self, piece: &Piece<'_>, i: usize) -> Remainder {
         let t = piece.triangle;
         let v = self.given.mesh.triangles()[t].map(|j| j.index());
-        let mut constants = self.fluxes.on_cells(t, i);
-        if self.fluxes.lacks_cells() {
-            for (c, &j) in constants.iter_mut().zip(&v) {
-                *c -= self.shares.cell(i, j);
-            }
-        }
+        let constants = constants(self.fluxes, self.shares, t, i, v);
         let share = v.map(|j| SIGN[i] * self.shares.theta[j]);
         let (load, action) = (piece.values(i), piece.values(ACTION));
         let affine = self.fluxes.affine(t, i).unwrap_or([0.0; 3]);
@@ -319,6 +406,10 @@ impl Integrand for Sampled<'_> {
         }
     }
 
+    fn reference(&self) -> Option<Reference> {
+        self.reference
+    }
+
     fn partition(&self) -> Partition {
         if self.varying == [false; 2] {
             Partition::WholeThenDual
@@ -328,7 +419,7 @@ impl Integrand for Sampled<'_> {
     }
 
     fn skips(&self, triangle: usize) -> bool {
-        self.varying == [false; 2] && self.moments.uniform(triangle)
+        self.known[triangle]
     }
 
     fn sample(&mut self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
@@ -357,7 +448,7 @@ impl Integrand for Sampled<'_> {
     fn judge(&self, piece: &Piece<'_>) -> Judgement {
         let t = piece.triangle;
         let (mut magnitude, mut error) = (self.share_of_misfit(piece), 0.0);
-        if !self.moments.uniform(t) {
+        if !self.moments.uniform(self.given.loads, t) {
             for i in 0..2 {
                 let (square, wrong) = self.judged_remainder(piece, i);
                 let weight = self.weight(t, i);
@@ -382,7 +473,7 @@ impl Integrand for Sampled<'_> {
 
     fn clear(&mut self, t: usize) {
         let norms = &mut self.norms[t];
-        if !self.moments.uniform(t) {
+        if !self.moments.uniform(self.given.loads, t) {
             norms.remainder = [0.0; 2];
         }
         for i in (0..2).filter(|&i| self.varying[i]) {
@@ -393,7 +484,7 @@ impl Integrand for Sampled<'_> {
     fn add(&mut self, piece: &Piece<'_>) {
         let t = piece.triangle;
         for i in 0..2 {
-            if !self.moments.uniform(t) {
+            if !self.moments.uniform(self.given.loads, t) {
                 self.norms[t].remainder[i] += self.judged_remainder(piece, i).0;
             }
             if self.varying[i] {

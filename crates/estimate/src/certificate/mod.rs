@@ -24,6 +24,7 @@ mod rt0;
 mod rt1;
 mod shares;
 
+use fem_core::integrate::Loads;
 use fem_core::{ElementValues, Field, FieldError, Mesh};
 
 pub use boundary::{BoundaryOscillation, boundary_oscillation};
@@ -54,6 +55,8 @@ pub struct Given<'a> {
     pub tension: [&'a dyn Field; 2],
     /// Moments of both.
     pub moments: &'a Moments,
+    /// What the discrete problem knows of the loads, from the same points as the moments.
+    pub loads: &'a [Loads; 2],
     /// Means of the tensions over the elements.
     pub tension_mean: &'a [ElementValues; 2],
     /// Displacements with u_1h >= u_2h at every vertex.
@@ -107,19 +110,44 @@ fn bound(eta: f64, contact: f64) -> f64 {
 /// # Errors
 /// A value of a load or a tension that is not finite.
 pub fn certify(given: &Given<'_>, grade: Grade, poincare: f64) -> Result<Certificate, FieldError> {
-    let mesh = given.mesh;
-    let moments = given.moments;
+    let covered = covered(given)?;
+    let given = &covered
+        .as_ref()
+        .map_or(*given, |moments| Given { moments, ..*given });
     let (shares, flux) = Shares::of(given);
     match grade {
         Grade::Rt0 => {
-            let (fluxes, squares) = rt0::equilibrate(mesh, moments, &shares, &flux);
+            let (fluxes, squares) = rt0::equilibrate(given, &shares, &flux);
             summed(given, grade, poincare, &shares, &flux, &squares, &fluxes)
         }
         Grade::Rt1 => {
-            let (fluxes, squares) = rt1::equilibrate(mesh, moments, &shares, &flux);
+            let (fluxes, squares) = rt1::equilibrate(given, &shares, &flux);
             summed(given, grade, poincare, &shares, &flux, &squares, &fluxes)
         }
     }
+}
+
+/// eta_alg of the certificate by itself; O(N), and far cheaper than the rest.
+///
+/// # Errors
+/// A value of a load that is not finite.
+pub fn algebraic(given: &Given<'_>) -> Result<f64, FieldError> {
+    let covered = covered(given)?;
+    let given = &covered
+        .as_ref()
+        .map_or(*given, |moments| Given { moments, ..*given });
+    let low = [0, 1].map(|i| given.moments.stiffness_low[i].least());
+    Ok(Shares::of(given).0.algebraic(given.mesh, low))
+}
+
+/// The moments with what the forces want and they lack, if they lack anything.
+fn covered(given: &Given<'_>) -> Result<Option<Moments>, FieldError> {
+    if given.moments.missing(given.mesh, given.force).is_empty() {
+        return Ok(None);
+    }
+    let mut moments = given.moments.clone();
+    moments.cover(given.mesh, given.load, given.tension, given.force)?;
+    Ok(Some(moments))
 }
 
 /// Norms and sums over the elements.
@@ -133,7 +161,7 @@ fn summed(
     fluxes: &dyn Reconstruction,
 ) -> Result<Certificate, FieldError> {
     let (mesh, moments) = (given.mesh, given.moments);
-    let norms = match moments.all_uniform() {
+    let norms = match moments.all_uniform(given.loads) {
         true => None,
         false => Some(norms(given, moments, shares, flux, squares, fluxes)?),
     };
@@ -183,7 +211,7 @@ fn contact_term(given: &Given<'_>, moments: &Moments, shares: &Shares, t: usize,
         let (theta, kappa) = (shares.theta[v[k]], shares.kappa[v[k]]);
         if theta > 0.0 {
             let part: f64 = (0..3)
-                .map(|l| moments.action.product(t, area, k, l) * gap[l])
+                .map(|l| moments.action_product(t, area, k, l) * gap[l])
                 .sum();
             sum += theta * part;
         }

@@ -1,62 +1,56 @@
-//! Moments of the loads and of the action inside contact, element by element.
+//! Moments of the action inside contact, element by element, and what is to be known of the tensions.
 //!
 //! lambda* = max(0, (mu_1 f_2 - mu_2 f_1)/(mu_1 + mu_2)) is the action that two membranes in contact exert on each other when the ratio of their
 //! tensions is constant. All integrals here use the same points as the load vectors ([`fem_core::integrate::load_pair`]), so that
 //! what cancels between loads and action cancels between their moments too.
 
 use fem_core::integrate::{
-    Integrand, Judgement, LOAD_CONTROL, Piece, Reference, integrate, judge_load,
+    Integrand, Judgement, LOAD_CONTROL, Loads, Piece, Reference, integrate, judge_load,
 };
 use fem_core::quadrature::affine_fit;
 use fem_core::{Field, FieldError, Mesh, Samples};
 
 /// Integrals against the products phi_0^2, phi_1^2, phi_2^2, phi_1 phi_2, phi_2 phi_0, phi_0 phi_1 of the hat functions of an element.
-pub(super) type Products = [f64; 6];
+type Products = [f64; 6];
 
 /// Position of phi_k phi_l in [`Products`].
 #[inline]
-pub(super) fn product(k: usize, l: usize) -> usize {
+fn product(k: usize, l: usize) -> usize {
     if k == l { k } else { 6 - k - l }
 }
 
-/// Moments of one function in every element.
+/// (p, phi_k phi_m) for m = 0, 1, 2 and the affine function p that has the given moments (p, phi_l).
+///
+/// For any function with these moments the sum over k is the same: its moments themselves.
+fn affine_products(moments: [f64; 3], k: usize) -> [f64; 3] {
+    let sum = moments[0] + moments[1] + moments[2];
+    // The values at the corners times the area, by the inverse of the mass matrix.
+    let corner = moments.map(|m| 12.0 * m - 3.0 * sum);
+    [0, 1, 2].map(|m| {
+        if m == k {
+            // 1/10 of the own corner, 1/30 of the others.
+            (corner[k] * 2.0 + corner[0] + corner[1] + corner[2]) / 30.0
+        } else {
+            // 1/30 of both corners, 1/60 of the third.
+            (corner[0] + corner[1] + corner[2] + corner[k] + corner[m]) / 60.0
+        }
+    })
+}
+
+/// Where the moments of an element are among those that are kept.
 #[derive(Clone, Debug)]
-pub(super) enum Integrals {
-    /// Those of a constant.
+enum Products3 {
+    /// Loads and lambda* are constants; lambda* is this one.
     Constant(f64),
-    /// Those of anything else.
-    Each(Vec<Products>),
+    /// The place of every element, [`NOWHERE`] where it was not sampled, and the products of f_1, f_2 and lambda* there.
+    Each(Vec<u32>, Vec<[Products; 3]>),
 }
 
-impl Integrals {
-    /// (g, phi_k phi_l) over element `t` of this area; |K|/6 times a constant if k = l, |K|/12 if not.
-    #[inline]
-    pub fn product(&self, t: usize, area: f64, k: usize, l: usize) -> f64 {
-        match self {
-            Integrals::Constant(value) => value * area / if k == l { 6.0 } else { 12.0 },
-            Integrals::Each(all) => all[t][product(k, l)],
-        }
-    }
+/// The place of an element that was not sampled.
+const NOWHERE: u32 = u32::MAX;
 
-    /// (g, phi_k) over element `t` of this area.
-    #[inline]
-    pub fn hat(&self, t: usize, area: f64, k: usize) -> f64 {
-        match self {
-            Integrals::Constant(value) => value * area / 3.0,
-            Integrals::Each(all) => {
-                let p = &all[t];
-                p[product(k, 0)] + p[product(k, 1)] + p[product(k, 2)]
-            }
-        }
-    }
-
-    fn each(&mut self) -> &mut [Products] {
-        match self {
-            Integrals::Constant(_) => &mut [],
-            Integrals::Each(all) => all,
-        }
-    }
-}
+/// Position of lambda* beside the loads.
+const ACTION: usize = 2;
 
 /// A value for every element.
 #[derive(Clone, Debug)]
@@ -92,21 +86,23 @@ impl Values {
     }
 }
 
-/// What is known of the data in every element; scaled. Nothing is stored of constants.
+/// What is known of the action inside contact and of the tensions in every element; scaled. Nothing is stored of constants.
+///
+/// Where both tensions are constants, elements apart from the contact set are not sampled: there the loads say all.
 #[derive(Clone, Debug)]
 pub struct Moments {
-    /// Of f_1 and f_2.
-    pub(super) load: [Integrals; 2],
-    /// Of lambda*.
-    pub(super) action: Integrals,
+    /// Of the loads and of lambda*.
+    products: Products3,
     /// Mean of 1/mu_i.
     pub(super) softness: [Values; 2],
     /// A lower bound for mu_i, from its samples and their trend towards the corners.
     pub(super) stiffness_low: [Values; 2],
     /// Number of elements in which the samples of a tension differ by more than a factor [`JUMP`].
     pub(super) jumps: usize,
-    /// Whether all samples of loads and tensions in the element are equal; empty where all data are constants.
+    /// Whether not all samples of loads and tensions in the element are equal; empty unless a tension varies.
     varied: Vec<bool>,
+    /// Whether all elements are sampled or need not be.
+    complete: bool,
     /// What the elements are judged by.
     reference: Reference,
 }
@@ -147,67 +143,226 @@ impl Moments {
         load: [&dyn Field; 2],
         tension: [&dyn Field; 2],
     ) -> Result<Moments, FieldError> {
-        let count = mesh.triangle_count();
-        let constants = [load[0], load[1], tension[0], tension[1]].map(|f| f.constant());
-        if let [Some(f1), Some(f2), Some(m1), Some(m2)] = constants {
-            return Ok(Moments {
-                load: [f1, f2].map(Integrals::Constant),
-                action: Integrals::Constant(contact_action([m1, m2], [f1, f2])),
-                softness: [m1, m2].map(|m| Values::Constant(1.0 / m)),
-                stiffness_low: [m1, m2].map(Values::Constant),
-                jumps: 0,
-                varied: Vec::new(),
-                reference: *reference,
-            });
+        let mut moments = Moments::empty(reference, mesh, load, tension);
+        moments.complete = true;
+        moments.sample(mesh, load, tension, |_| true)?;
+        Ok(moments)
+    }
+
+    /// Integrates where it matters for a pair with these action forces, one a vertex; see [`Moments::cover`].
+    ///
+    /// # Errors
+    /// A value of a load or a tension that is not finite.
+    pub fn near(
+        reference: &Reference,
+        mesh: &Mesh,
+        load: [&dyn Field; 2],
+        tension: [&dyn Field; 2],
+        force: &[f64],
+    ) -> Result<Moments, FieldError> {
+        let mut moments = Moments::empty(reference, mesh, load, tension);
+        if moments.complete {
+            moments.sample(mesh, load, tension, |_| true)?;
+        } else {
+            moments.cover(mesh, load, tension, force)?;
         }
-        let zeros = || Integrals::Each(vec![[0.0; 6]; count]);
-        let per_element = |i: usize, of: fn(f64) -> f64, begin: f64| match constants[2 + i] {
+        Ok(moments)
+    }
+
+    /// Integrates over the elements that these action forces make matter and that were not sampled yet.
+    ///
+    /// # Errors
+    /// A value of a load that is not finite.
+    pub fn cover(
+        &mut self,
+        mesh: &Mesh,
+        load: [&dyn Field; 2],
+        tension: [&dyn Field; 2],
+        force: &[f64],
+    ) -> Result<(), FieldError> {
+        let missing = self.missing(mesh, force);
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let mut new = vec![false; mesh.triangle_count()];
+        for &t in &missing {
+            new[t] = true;
+        }
+        self.sample(mesh, load, tension, |t| new[t])
+    }
+
+    /// The elements that touch a vertex with a force, or one on the boundary that such a vertex may lend its share to, and were not sampled.
+    pub(super) fn missing(&self, mesh: &Mesh, force: &[f64]) -> Vec<usize> {
+        let Products3::Each(place, _) = &self.products else {
+            return Vec::new();
+        };
+        if self.complete {
+            return Vec::new();
+        }
+        let boundary = mesh.boundary();
+        let pressed = |j: usize| !boundary[j] && force[j] > 0.0;
+        // Shares go along the boundary as far as there are gaps to close: all of it may be reached.
+        let any = mesh.triangles().iter().any(|v| {
+            let v = v.map(|j| j.index());
+            v.iter().any(|&j| pressed(j)) && v.iter().any(|&j| boundary[j])
+        });
+        let matters = |j: usize| pressed(j) || (any && boundary[j]);
+        let triangles = mesh.triangles().iter().enumerate();
+        triangles
+            .filter(|(t, v)| place[*t] == NOWHERE && v.iter().any(|j| matters(j.index())))
+            .map(|(t, _)| t)
+            .collect()
+    }
+
+    /// Nothing known yet but what is constant.
+    fn empty(
+        reference: &Reference,
+        mesh: &Mesh,
+        load: [&dyn Field; 2],
+        tension: [&dyn Field; 2],
+    ) -> Moments {
+        let count = mesh.triangle_count();
+        let [f1, f2] = load.map(|f| f.constant());
+        let [m1, m2] = tension.map(|f| f.constant());
+        let products = match [f1, f2, m1, m2] {
+            [Some(f1), Some(f2), Some(m1), Some(m2)] => {
+                Products3::Constant(contact_action([m1, m2], [f1, f2]))
+            }
+            _ => Products3::Each(vec![NOWHERE; count], Vec::new()),
+        };
+        let per_element = |constant: Option<f64>, of: fn(f64) -> f64, begin: f64| match constant {
             Some(value) => Values::Constant(of(value)),
             None => Values::Each(vec![begin; count]),
         };
-        let varying = [0, 1].map(|i| constants[2 + i].is_none());
-        let result = Moments {
-            load: [zeros(), zeros()],
-            action: zeros(),
-            softness: [0, 1].map(|i| per_element(i, |m| 1.0 / m, 0.0)),
-            stiffness_low: [0, 1].map(|i| per_element(i, |m| m, f64::INFINITY)),
+        let varies = m1.is_none() || m2.is_none();
+        Moments {
+            complete: varies || matches!(products, Products3::Constant(_)),
+            products,
+            softness: [m1, m2].map(|m| per_element(m, |m| 1.0 / m, 0.0)),
+            stiffness_low: [m1, m2].map(|m| per_element(m, |m| m, f64::INFINITY)),
             jumps: 0,
-            varied: vec![false; count],
+            varied: vec![false; if varies { count } else { 0 }],
             reference: *reference,
+        }
+    }
+
+    /// Integrates over the elements that are wanted.
+    fn sample(
+        &mut self,
+        mesh: &Mesh,
+        load: [&dyn Field; 2],
+        tension: [&dyn Field; 2],
+        wanted: impl Fn(usize) -> bool,
+    ) -> Result<(), FieldError> {
+        let Products3::Each(place, products) = &mut self.products else {
+            return Ok(());
         };
+        let count = mesh.triangle_count();
+        for (t, place) in place.iter_mut().enumerate().filter(|(t, _)| wanted(*t)) {
+            debug_assert_eq!(*place, NOWHERE, "triangle {t} is sampled again");
+            *place = products.len() as u32;
+            products.push([[0.0; 6]; 3]);
+        }
+        let constant = tension.map(|f| f.constant());
+        let varying = constant.map(|c| c.is_none());
         let range = varying.map(|v| vec![NOTHING; if v { count } else { 0 }]);
         let mut integrand = Sums {
             fields: [load[0], load[1], tension[0], tension[1]],
+            constant,
             varying,
-            moments: result,
-            first: vec![None; count],
+            first: vec![None; self.varied.len()],
+            wanted: &wanted,
+            moments: self,
             range,
         };
         integrate(mesh, LOAD_CONTROL, &mut integrand)?;
-        let Sums {
-            mut moments, range, ..
-        } = integrand;
+        let range = integrand.range;
+        if varying == [false; 2] {
+            return Ok(());
+        }
         let mut jump = vec![false; count];
         for i in (0..2).filter(|&i| varying[i]) {
             for t in 0..count {
-                moments.softness[i].each()[t] /= mesh.shape(fem_core::TriangleId(t as u32)).area;
+                self.softness[i].each()[t] /= mesh.shape(fem_core::TriangleId(t as u32)).area;
                 let [least, largest] = range[i][t];
                 jump[t] |= largest > JUMP * least;
             }
         }
-        moments.jumps = jump.iter().filter(|j| **j).count();
-        Ok(moments)
+        self.jumps = jump.iter().filter(|j| **j).count();
+        Ok(())
+    }
+
+    /// (g, phi_k phi_l) over element `t` of this area for g = f_1, f_2 or lambda*; 0 where it was not sampled, and |K|/6 times a constant if k = l,
+    /// |K|/12 if not.
+    #[inline]
+    fn product(&self, which: usize, t: usize, area: f64, k: usize, l: usize) -> f64 {
+        match &self.products {
+            Products3::Constant(value) => value * area / if k == l { 6.0 } else { 12.0 },
+            Products3::Each(place, products) => products
+                .get(place[t] as usize)
+                .map_or(0.0, |p| p[which][product(k, l)]),
+        }
+    }
+
+    /// (lambda*, phi_k phi_l) over element `t` of this area.
+    #[inline]
+    pub fn action_product(&self, t: usize, area: f64, k: usize, l: usize) -> f64 {
+        self.product(ACTION, t, area, k, l)
+    }
+
+    /// (lambda*, phi_k) over element `t` of this area.
+    #[inline]
+    pub fn action_hat(&self, t: usize, area: f64, k: usize) -> f64 {
+        match &self.products {
+            Products3::Constant(value) => value * area / 3.0,
+            Products3::Each(place, products) => products.get(place[t] as usize).map_or(0.0, |p| {
+                let p = &p[ACTION];
+                p[product(k, 0)] + p[product(k, 1)] + p[product(k, 2)]
+            }),
+        }
+    }
+
+    /// (f_i, phi_k phi_m) over an element for m = 0, 1, 2: from samples where lambda* `acts`, since it must cancel there; else of the affine function that
+    /// has the same moments `hats` as f_i.
+    pub(super) fn load_products(
+        &self,
+        i: usize,
+        t: usize,
+        k: usize,
+        hats: [f64; 3],
+        acts: bool,
+    ) -> [f64; 3] {
+        match &self.products {
+            Products3::Each(place, products) if acts => {
+                let products = products.get(place[t] as usize);
+                products.map_or([0.0; 3], |p| [0, 1, 2].map(|m| p[i][product(k, m)]))
+            }
+            _ => affine_products(hats, k),
+        }
     }
 
     /// Whether all data are constant in an element.
     #[inline]
-    pub(super) fn uniform(&self, t: usize) -> bool {
-        self.varied.is_empty() || !self.varied[t]
+    pub(super) fn uniform(&self, loads: &[Loads; 2], t: usize) -> bool {
+        match self.varied.get(t) {
+            Some(varied) => !varied,
+            None => loads.iter().all(|f| f.deviation_squared(t) == 0.0),
+        }
+    }
+
+    /// The products of an element that is sampled.
+    fn each(&mut self, t: usize) -> &mut [Products] {
+        match &mut self.products {
+            Products3::Each(place, products) => products
+                .get_mut(place[t] as usize)
+                .map_or(&mut [], |p| &mut p[..]),
+            Products3::Constant(_) => &mut [],
+        }
     }
 
     /// Whether all data are constant in every element.
-    pub(super) fn all_uniform(&self) -> bool {
-        !self.varied.contains(&true)
+    pub(super) fn all_uniform(&self, loads: &[Loads; 2]) -> bool {
+        loads.iter().all(|f| f.same().is_some()) && !self.varied.contains(&true)
     }
 }
 
@@ -215,9 +370,13 @@ impl Moments {
 struct Sums<'a> {
     /// f_1, f_2, mu_1, mu_2.
     fields: [&'a dyn Field; 4],
+    /// The tensions that are constants.
+    constant: [Option<f64>; 2],
     varying: [bool; 2],
-    moments: Moments,
-    /// The first samples met in an element.
+    moments: &'a mut Moments,
+    /// The elements to be sampled.
+    wanted: &'a dyn Fn(usize) -> bool,
+    /// The first samples met in an element, where a tension varies.
     first: Vec<Option<[f64; 4]>>,
     /// The least and the largest sample of a tension that varies.
     range: [Vec<[f64; 2]>; 2],
@@ -232,7 +391,11 @@ impl Integrand for Sums<'_> {
     }
 
     fn components(&self) -> usize {
-        4
+        if self.varying == [false; 2] { 2 } else { 4 }
+    }
+
+    fn skips(&self, triangle: usize) -> bool {
+        !(self.wanted)(triangle)
     }
 
     fn sample(&mut self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
@@ -252,12 +415,12 @@ impl Integrand for Sums<'_> {
     }
 
     fn clear(&mut self, t: usize) {
-        let moments = &mut self.moments;
-        moments.load[0].each()[t] = [0.0; 6];
-        moments.load[1].each()[t] = [0.0; 6];
-        moments.action.each()[t] = [0.0; 6];
-        moments.varied[t] = false;
-        self.first[t] = None;
+        let moments = &mut *self.moments;
+        moments.each(t).fill([0.0; 6]);
+        if let Some(first) = self.first.get_mut(t) {
+            moments.varied[t] = false;
+            *first = None;
+        }
         for i in (0..2).filter(|&i| self.varying[i]) {
             moments.softness[i].each()[t] = 0.0;
             moments.stiffness_low[i].each()[t] = f64::INFINITY;
@@ -267,14 +430,15 @@ impl Integrand for Sums<'_> {
 
     fn add(&mut self, piece: &Piece<'_>) {
         let t = piece.triangle;
-        let values = [0, 1, 2, 3].map(|c| piece.values(c));
-        let first = *self.first[t].get_or_insert([0, 1, 2, 3].map(|c| values[c][0]));
-        let moments = &mut self.moments;
+        let loads = [0, 1].map(|c| piece.values(c));
+        let tension = |i: usize, k: usize| match self.constant[i] {
+            Some(value) => value,
+            None => piece.values(2 + i)[k],
+        };
         for (k, (point, at)) in piece.rule.iter().zip(piece.at).enumerate() {
-            let sample = [0, 1, 2, 3].map(|c| values[c][k]);
-            moments.varied[t] |= sample != first;
+            let [f1, f2] = loads.map(|v| v[k]);
+            let [m1, m2] = [0, 1].map(|i| tension(i, k));
             let weight = point.weight * piece.area;
-            let [f1, f2, m1, m2] = sample;
             let action = contact_action([m1, m2], [f1, f2]);
             let shapes = [
                 at[0] * at[0],
@@ -284,23 +448,26 @@ impl Integrand for Sums<'_> {
                 at[2] * at[0],
                 at[0] * at[1],
             ];
-            let [first, second] = &mut moments.load;
-            for (integrals, value) in [(first, f1), (second, f2), (&mut moments.action, action)] {
-                for (sum, shape) in integrals.each()[t].iter_mut().zip(&shapes) {
+            for (sums, value) in self.moments.each(t).iter_mut().zip([f1, f2, action]) {
+                for (sum, shape) in sums.iter_mut().zip(&shapes) {
                     *sum += weight * shape * value;
                 }
             }
+            if let Some(first) = self.first.get_mut(t) {
+                let sample = [f1, f2, m1, m2];
+                self.moments.varied[t] |= sample != *first.get_or_insert(sample);
+            }
             for (i, mu) in [(0, m1), (1, m2)] {
                 if self.varying[i] {
-                    moments.softness[i].each()[t] += weight / mu;
+                    self.moments.softness[i].each()[t] += weight / mu;
                     let [least, largest] = &mut self.range[i][t];
                     (*least, *largest) = (least.min(mu), largest.max(mu));
                 }
             }
         }
         for i in (0..2).filter(|&i| self.varying[i]) {
-            let low = &mut moments.stiffness_low[i].each()[t];
-            *low = low.min(lowest(piece, values[2 + i]));
+            let low = &mut self.moments.stiffness_low[i].each()[t];
+            *low = low.min(lowest(piece, piece.values(2 + i)));
         }
     }
 }

@@ -11,6 +11,7 @@
 use fem_core::quadrature::POINTS;
 use fem_core::{Mesh, TriangleId};
 
+use super::Given;
 use super::fan::{Corner, Fan, beginnings};
 use super::misfit::{Frame, Reconstruction};
 use super::moments::Moments;
@@ -76,13 +77,18 @@ impl Form {
 ///
 /// Returns the fluxes and ||tau||^2_K for every element and membrane, without the weight 1/mu.
 pub(super) fn equilibrate<'a>(
-    mesh: &'a Mesh,
-    moments: &'a Moments,
+    given: &Given<'a>,
     shares: &Shares,
     flux: &[[[f64; 2]; 2]],
 ) -> (Fluxes<'a>, Vec<[f64; 2]>) {
+    let Given {
+        mesh,
+        moments,
+        loads,
+        ..
+    } = *given;
     let count = mesh.triangle_count();
-    let kept = if moments.all_uniform() { 0 } else { count };
+    let kept = if moments.all_uniform(loads) { 0 } else { count };
     let mut fluxes = Fluxes {
         mesh,
         moments,
@@ -117,13 +123,14 @@ pub(super) fn equilibrate<'a>(
             }
             let form = Form::of(&frame.products);
             let area = frame.products.area;
-            let action = theta * moments.action.hat(t, area, k);
+            let action = theta * moments.action_hat(t, area, k);
+            let hats = loads.each_ref().map(|f| f.moments(t, area)[k]);
             let mut link = Link {
                 form,
                 flux: [[0.0; 2]; 2],
             };
             for i in 0..2 {
-                let balanced = 3.0 / area * (moments.load[i].hat(t, area, k) + SIGN[i] * action);
+                let balanced = 3.0 / area * (hats[i] + SIGN[i] * action);
                 let h = (balanced + cell[i]) * area / 6.0;
                 let w = moments.softness[i].at(t);
                 slope[i] += w * (2.0 * alpha[i] * form.a + h * form.b);
@@ -166,7 +173,7 @@ const UNIFORM: f64 = 5.0 / 108.0;
 impl Reconstruction for Fluxes<'_> {
     fn uniform_remainder(&self, t: usize, _: usize, area: f64, shares: &Shares) -> f64 {
         // The balance at corner k is f_i +- theta_k lambda*, whose interpolant meets the data.
-        let action = 3.0 * self.moments.action.hat(t, area, 0) / area;
+        let action = 3.0 * self.moments.action_hat(t, area, 0) / area;
         let theta = self.mesh.triangles()[t].map(|j| shares.theta[j.index()]);
         UNIFORM * area * action * action * super::misfit::pairs(theta)
     }

@@ -18,9 +18,10 @@
 use fem_core::Mesh;
 use fem_core::quadrature::POINTS;
 
+use super::Given;
 use super::fan::{Corner, Fan, beginnings};
 use super::misfit::{CornerFrame, Frame, Reconstruction, pairs};
-use super::moments::{Moments, Values};
+use super::moments::Values;
 use super::ring::Ring;
 use super::shares::{SIGN, Shares};
 
@@ -181,11 +182,11 @@ pub(super) struct Fluxes<'a> {
 ///
 /// Returns the fluxes and ||tau||^2_K for every element and membrane, without the weight 1/mu.
 pub(super) fn equilibrate<'a>(
-    mesh: &'a Mesh,
-    moments: &Moments,
+    given: &Given<'a>,
     shares: &Shares,
     flux: &[[[f64; 2]; 2]],
 ) -> (Fluxes<'a>, Vec<[f64; 2]>) {
+    let (mesh, moments) = (given.mesh, given.moments);
     let count = mesh.triangle_count();
     let gram = Gram::new();
     let forms = Forms::new(&gram);
@@ -200,7 +201,7 @@ pub(super) fn equilibrate<'a>(
         links.extend(
             fan.corners
                 .iter()
-                .map(|&corner| Link::new(mesh, moments, shares, &forms, corner)),
+                .map(|&corner| Link::new(given, shares, &forms, corner)),
         );
         for i in 0..2 {
             solve(&fan, &mut links, i, flux, &moments.softness[i], &mut ring);
@@ -258,7 +259,8 @@ struct Link {
 }
 
 impl Link {
-    fn new(mesh: &Mesh, data: &Moments, shares: &Shares, forms: &Forms, corner: Corner) -> Link {
+    fn new(given: &Given<'_>, shares: &Shares, forms: &Forms, corner: Corner) -> Link {
+        let mesh = given.mesh;
         let (t, k) = (corner.index(), corner.corner());
         let j = mesh.triangles()[t][k].index();
         let frame = Frame::of(mesh, corner);
@@ -266,13 +268,18 @@ impl Link {
         // (chi_Dj, phi) for the vertex itself and the two other corners.
         let cell = [11.0 * area / 54.0, 7.0 * area / 108.0, 7.0 * area / 108.0];
         let theta = shares.theta[j];
+        let acts = mesh.triangles()[t]
+            .iter()
+            .any(|j| shares.theta[j.index()] != 0.0);
         let moments = [0, 1].map(|i| {
             let own = shares.cell(i, j);
+            let hats = given.loads[i].moments(t, area);
+            let load = given.moments.load_products(i, t, k, hats, acts);
             let mut result = [0.0; 3];
             for l in 0..3 {
                 let m = (k + l) % 3;
-                result[l] = data.load[i].product(t, area, k, m)
-                    + SIGN[i] * theta * data.action.product(t, area, k, m)
+                result[l] = load[m]
+                    + SIGN[i] * theta * given.moments.action_product(t, area, k, m)
                     + own * cell[l];
             }
             result

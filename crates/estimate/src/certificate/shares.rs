@@ -43,15 +43,15 @@ impl Shares {
                 [mu * g[0], mu * g[1]]
             });
             flux.push(own);
+            let hats = given.loads.each_ref().map(|f| f.moments(t, shape.area));
             for (k, v) in vertices.iter().enumerate() {
                 let j = v.index();
                 area[j] += shape.area / 3.0;
-                action[j] += moments.action.hat(t, shape.area, k);
+                action[j] += moments.action_hat(t, shape.area, k);
                 let g = shape.gradients[k];
                 for i in 0..2 {
                     let q = own[i];
-                    rows[i][j] += moments.load[i].hat(t, shape.area, k)
-                        - shape.area * (q[0] * g[0] + q[1] * g[1]);
+                    rows[i][j] += hats[i][k] - shape.area * (q[0] * g[0] + q[1] * g[1]);
                 }
             }
         }

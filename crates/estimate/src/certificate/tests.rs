@@ -1,5 +1,6 @@
 //! The fluxes themselves: continuous normal components, divergence, and the norms in closed form against quadrature.
 
+use fem_core::integrate::load_pair;
 use fem_core::quadrature::{POINTS, rule};
 use fem_core::{Children, Constant, ElementValues, Field, Mesh, TriangleId};
 
@@ -58,11 +59,13 @@ fn with(look: impl FnOnce(&Case, &Given<'_>, &Shares, &[[[f64; 2]; 2]])) {
     let load: [&dyn Field; 2] = [&first_load, &second_load];
     let tension: [&dyn Field; 2] = [&TENSION[0], &TENSION[1]];
     let moments = Moments::of(&case.mesh, load, tension).expect("finite");
+    let loads = load_pair(&case.mesh, load).expect("finite");
     let given = Given {
         mesh: &case.mesh,
         load,
         tension,
         moments: &moments,
+        loads: &loads,
         tension_mean: &case.tension_mean,
         displacement: &case.displacement,
         force: &case.force,
@@ -122,9 +125,9 @@ fn is_continuous(case: &Case, fluxes: &dyn Reconstruction, gradient: &[[[f64; 2]
 #[test]
 fn fluxes_of_both_grades_are_continuous() {
     with(|case, given, shares, gradient| {
-        let (fluxes, _) = rt0::equilibrate(given.mesh, given.moments, shares, gradient);
+        let (fluxes, _) = rt0::equilibrate(given, shares, gradient);
         is_continuous(case, &fluxes, gradient);
-        let (fluxes, _) = rt1::equilibrate(given.mesh, given.moments, shares, gradient);
+        let (fluxes, _) = rt1::equilibrate(given, shares, gradient);
         is_continuous(case, &fluxes, gradient);
     });
 }
@@ -156,9 +159,8 @@ fn by_quadrature(mesh: &Mesh, fluxes: &dyn Reconstruction, t: usize, i: usize) -
 #[test]
 fn closed_norms_are_those_of_the_fields() {
     with(|case, given, shares, gradient| {
-        let (coarse, coarse_squares) =
-            rt0::equilibrate(given.mesh, given.moments, shares, gradient);
-        let (fine, fine_squares) = rt1::equilibrate(given.mesh, given.moments, shares, gradient);
+        let (coarse, coarse_squares) = rt0::equilibrate(given, shares, gradient);
+        let (fine, fine_squares) = rt1::equilibrate(given, shares, gradient);
         for t in 0..case.mesh.triangle_count() {
             for i in 0..2 {
                 close(
@@ -180,8 +182,8 @@ fn closed_norms_are_those_of_the_fields() {
 #[test]
 fn fluxes_balance_every_element() {
     with(|case, given, shares, gradient| {
-        let (coarse, _) = rt0::equilibrate(given.mesh, given.moments, shares, gradient);
-        let (fine, _) = rt1::equilibrate(given.mesh, given.moments, shares, gradient);
+        let (coarse, _) = rt0::equilibrate(given, shares, gradient);
+        let (fine, _) = rt1::equilibrate(given, shares, gradient);
         for grade in [&coarse as &dyn Reconstruction, &fine] {
             for t in 0..case.mesh.triangle_count() {
                 let shape = case.mesh.shape(TriangleId(t as u32));
@@ -203,9 +205,10 @@ fn fluxes_balance_every_element() {
                     }
                     let sign = [1.0, -1.0][i];
                     let mut wanted = 0.0;
+                    let hats = given.loads[i].moments(t, shape.area);
                     for (k, &j) in v.iter().enumerate() {
-                        wanted += given.moments.load[i].hat(t, shape.area, k)
-                            + sign * shares.theta[j] * given.moments.action.hat(t, shape.area, k)
+                        wanted += hats[k]
+                            + sign * shares.theta[j] * given.moments.action_hat(t, shape.area, k)
                             + shares.cell(i, j) * shape.area / 3.0;
                     }
                     assert!((outward - wanted).abs() < 1e-13, "{outward} {wanted}");
@@ -224,7 +227,7 @@ fn shares_add_to_the_forces() {
         for (t, v) in mesh.triangles().iter().enumerate() {
             let area = mesh.shape(TriangleId(t as u32)).area;
             for (k, v) in v.iter().enumerate() {
-                action[v.index()] += given.moments.action.hat(t, area, k);
+                action[v.index()] += given.moments.action_hat(t, area, k);
             }
         }
         let mut parts = [0, 0];
@@ -253,6 +256,7 @@ fn an_exact_pair_is_certified_to_rounding() {
     let load: [&dyn Field; 2] = [&zero, &zero];
     let tension: [&dyn Field; 2] = [&TENSION[0], &TENSION[1]];
     let moments = Moments::of(&case.mesh, load, tension).expect("finite");
+    let loads = load_pair(&case.mesh, load).expect("finite");
     let displacement = [affine.clone(), affine.iter().map(|u| u - 1.0).collect()];
     let force = vec![0.0; affine.len()];
     let given = Given {
@@ -260,6 +264,7 @@ fn an_exact_pair_is_certified_to_rounding() {
         load,
         tension,
         moments: &moments,
+        loads: &loads,
         tension_mean: &case.tension_mean,
         displacement: &displacement,
         force: &force,
