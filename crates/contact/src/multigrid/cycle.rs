@@ -25,11 +25,12 @@ impl<U: Unknowns> Levels<U> {
                 r[q] = U::Value::default();
                 let entries =
                     hierarchy.old_start[row] as usize..hierarchy.old_start[row + 1] as usize;
-                for (&j, &a) in hierarchy.old_column[entries.clone()]
+                for (&edge, &a) in hierarchy.old_entry[entries.clone()]
                     .iter()
                     .zip(&self.old_coupling[entries])
                 {
-                    r[j as usize] = U::minus_transposed(r[j as usize], a, step);
+                    let j = edge.other();
+                    r[j] = U::minus_transposed(r[j], a, step);
                 }
             }
             for row in rows {
@@ -83,11 +84,11 @@ impl<U: Unknowns> Levels<U> {
     fn old_rest(&self, hierarchy: &Hierarchy, row: usize, c: &[U::Value]) -> U::Value {
         let entries = hierarchy.old_start[row] as usize..hierarchy.old_start[row + 1] as usize;
         let mut rest = self.old_residual[row];
-        for (&j, &a) in hierarchy.old_column[entries.clone()]
+        for (&edge, &a) in hierarchy.old_entry[entries.clone()]
             .iter()
             .zip(&self.old_coupling[entries])
         {
-            rest = U::minus(rest, a, c[j as usize]);
+            rest = U::minus(rest, a, c[edge.other()]);
         }
         rest
     }

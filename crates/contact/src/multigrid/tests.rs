@@ -99,7 +99,8 @@ fn levels_are_prefixes_and_every_edge_has_its_slot() {
             for &k in problem.pattern().columns(j) {
                 let q = h.rank[k as usize] as usize;
                 if q < p {
-                    assert!(h.slot(p, q).is_some_and(|s| s < h.slots() - 1));
+                    let slot = h.slot(q as u32, p as u32);
+                    assert!(slot < h.slots() - 1 && h.edges(p).any(|e| e == (q, slot)));
                     seen += 1;
                 }
             }
@@ -196,7 +197,7 @@ fn galerkin<U: Unknowns>(contact_seed: Option<u64>) {
             let q = h.old_vertex[row] as usize;
             for e in h.old_start[row] as usize..h.old_start[row + 1] as usize {
                 for (i, j) in [(0, 0), (0, U::WIDTH - 1), (U::WIDTH - 1, 0)] {
-                    let other = h.old_column[e] as usize;
+                    let other = h.old_entry[e].other();
                     let exact = entry(&function(level, q, i), &function(level, other, j));
                     let found = U::coupling_at(levels.old_coupling[e], i, j);
                     assert!((found - exact).abs() < 1e-12, "{found} {exact}");
