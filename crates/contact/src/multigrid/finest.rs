@@ -38,11 +38,15 @@ impl<U: Unknowns> Finest<U> {
         refill(&mut self.slot, hierarchy.slots(), zero);
         refill(&mut self.diagonal, hierarchy.len(), zero);
         self.rim.clear();
-        let (points, boundary) = (mesh.points(), mesh.boundary());
+        // One length, so that one check of an index serves all three.
+        let n = hierarchy.len();
+        let (points, boundary) = (&mesh.points()[..n], &mesh.boundary()[..n]);
+        let ranks = &hierarchy.rank[..n];
         for (t, v) in mesh.triangles().iter().enumerate() {
             let v = v.map(|v| v.index());
             let corner = v.map(|j| points[j]);
-            let rank = v.map(|j| hierarchy.rank[j]);
+            let rank = v.map(|j| ranks[j]);
+            let fixed = v.map(|j| boundary[j]);
             let edge =
                 [(1, 2), (2, 0), (0, 1)].map(|(k, l)| [0, 1].map(|i| corner[l][i] - corner[k][i]));
             let twice = edge[2][1] * edge[1][0] - edge[2][0] * edge[1][1];
@@ -60,7 +64,6 @@ impl<U: Unknowns> Finest<U> {
                 let partly = U::plain_plus(*diagonal, -1.0, entries[i]);
                 *diagonal = U::plain_plus(partly, -1.0, entries[j]);
             }
-            let fixed = v.map(|j| boundary[j]);
             if fixed == [false; 3] {
                 for ([k, l], entry) in faces.into_iter().zip(entries) {
                     let slot = &mut self.slot[hierarchy.slot(rank[k], rank[l])];

@@ -6,6 +6,9 @@ use super::hierarchy::Hierarchy;
 use super::unknowns::Unknowns;
 use crate::error::SolveError;
 
+/// Up to one vertex in so many in contact, the edges around those alone are truncated.
+const FEW: usize = 4;
+
 /// Rows of every level that are smoothed there, and the solver of the initial mesh.
 #[derive(Default)]
 pub(crate) struct Levels<U: Unknowns> {
@@ -97,8 +100,8 @@ impl<U: Unknowns> Levels<U> {
             let pivots = pivots.iter_mut().zip(&finest.diagonal[ranks]);
             let coupling = &mut self.coupling[..];
             for ((own, (quad, around)), (pivot, &diagonal)) in young.zip(vertices).zip(pivots) {
-                let own = &coupling[4 * own..][..4];
-                let [al, be, ga, de] = [own[0], own[1], own[2], own[3]];
+                let (own, _) = coupling[4 * own..4 * own + 4].as_chunks::<4>();
+                let [al, be, ga, de] = own[0];
                 let &[a, b, c, d] = quad;
                 for (q, to) in [(a, al), (b, be)] {
                     let parent = &mut older[q as usize];
@@ -149,17 +152,41 @@ impl<U: Unknowns> Levels<U> {
         // Nothing joins the boundary in the first place.
         let touching = contact.iter().zip(&hierarchy.fixed).enumerate();
         let touching = touching.filter(|(_, (contact, fixed))| **contact && !**fixed);
-        for (p, _) in touching {
-            let share = finest.share(p);
-            self.pivot[p] = U::truncated_pivot(finest.diagonal[p], Some(share));
-            for (q, slot) in hierarchy.edges(p).filter(|&(q, _)| !hierarchy.fixed[q]) {
-                let other = contact[q].then(|| finest.share(q));
-                let [row, column] = if p > q {
-                    [Some(share), other]
-                } else {
-                    [other, Some(share)]
-                };
-                self.coupling[slot] = U::truncated(finest.slot[slot], row, column);
+        let mut count = 0;
+        for (p, _) in touching.clone() {
+            self.pivot[p] = U::truncated_pivot(finest.diagonal[p], Some(finest.share(p)));
+            count += 1;
+        }
+        let glued = |q: usize| contact[q].then(|| finest.share(q));
+        if count * FEW <= contact.len() {
+            for (p, _) in touching {
+                for (q, slot) in hierarchy.edges(p).filter(|&(q, _)| !hierarchy.fixed[q]) {
+                    let (row, column) = (p.max(q), p.min(q));
+                    self.coupling[slot] =
+                        U::truncated(finest.slot[slot], glued(row), glued(column));
+                }
+            }
+            return;
+        }
+        let n0 = hierarchy.initial();
+        let (own, initial) = self.coupling.split_at_mut(4 * hierarchy.quad.len());
+        let (own, _) = own.as_chunks_mut::<4>();
+        let young = hierarchy.quad.iter().zip(own).zip(&contact[n0..]);
+        for (p, ((quad, own), &row)) in young.enumerate() {
+            let column = quad.map(|q| contact[q as usize]);
+            if row || column != [false; 4] {
+                let row = glued(n0 + p);
+                for k in 0..4 {
+                    let entry = finest.slot[4 * p + k];
+                    own[k] = U::truncated(entry, row, glued(quad[k] as usize));
+                }
+            }
+        }
+        for x in 0..n0 {
+            let first = hierarchy.macro_start[x] as usize;
+            for (m, &y) in (first..).zip(hierarchy.macro_row(x)) {
+                let entry = finest.slot[4 * hierarchy.quad.len() + m];
+                initial[m] = U::truncated(entry, glued(x), glued(y as usize));
             }
         }
     }

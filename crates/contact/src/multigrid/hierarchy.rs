@@ -284,7 +284,8 @@ impl Hierarchy {
     }
 
     /// The smaller ranks that the edges of the initial mesh join to one of its ranks.
-    fn macro_row(&self, x: usize) -> &[u32] {
+    #[inline]
+    pub fn macro_row(&self, x: usize) -> &[u32] {
         &self.macro_end[self.macro_start[x] as usize..self.macro_start[x + 1] as usize]
     }
 
