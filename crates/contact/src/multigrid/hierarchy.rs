@@ -292,13 +292,14 @@ impl Hierarchy {
     /// The slot of an edge that is seen from x.
     #[inline]
     pub fn slot_of(&self, x: u32, edge: Edge) -> usize {
-        let n0 = self.level[1];
-        let other = edge.0 >> 2;
-        let (x, y) = (x.max(other), x.min(other));
-        if x >= n0 {
-            4 * (x - n0) as usize + (edge.0 & 3) as usize
-        } else {
-            self.macro_slot(x, y)
+        // Both ends would call the edge so if it were theirs; it is the younger one's.
+        let theirs = edge.0.max(x << 2 | edge.0 & 3);
+        match theirs.checked_sub(4 * self.level[1]) {
+            Some(slot) => slot as usize,
+            None => {
+                let other = edge.0 >> 2;
+                self.macro_slot(x.max(other), x.min(other))
+            }
         }
     }
 
@@ -347,8 +348,8 @@ impl Hierarchy {
             let quads = &self.quad[ranks.start - n0..ranks.end - n0];
             for (p, quad) in ranks.zip(quads) {
                 let rim = self.fixed[p] || quad.iter().any(|&q| self.fixed[q as usize]);
-                self.bisect(&mut growing, p, quad, rim);
-                around.push(self.slots_around(quad, rim));
+                let ab = self.bisect(&mut growing, p, quad, rim);
+                around.push(self.slots_around(quad, ab, rim));
                 for &q in &quad[..2] {
                     let seen = &mut listed[q as usize];
                     if *seen < level as u16 {
@@ -381,23 +382,27 @@ impl Hierarchy {
     }
 
     /// Bisects the edge ab at p: in the rows of a and b the edge to p stands where that between them stood. `rim` tells whether one of the
-    /// five lies on the boundary.
+    /// five lies on the boundary. The slot of ab.
     #[inline]
-    fn bisect(&self, growing: &mut Growing, p: usize, quad: &[u32; 4], rim: bool) {
+    fn bisect(&self, growing: &mut Growing, p: usize, quad: &[u32; 4], rim: bool) -> usize {
         let n0 = self.initial();
         let &[a, b, c, d] = quad;
         let (young, old) = (a.max(b), a.min(b));
         let mut place = [FAR; 2];
-        if young as usize >= n0 {
+        let slot = if young as usize >= n0 {
             let at = young as usize - n0;
             let k = number_in(&self.quad[at], old);
-            let other = growing.place[4 * at + k];
+            let slot = 4 * at + k;
+            let other = growing.place[slot];
             place = if a > b {
                 [k as u8, other]
             } else {
                 [other, k as u8]
             };
-        }
+            slot
+        } else {
+            self.macro_slot(young, old)
+        };
         let edge = p as u32;
         let mut own = [
             growing.put(a, place[0], b, Edge::new(edge, 0)),
@@ -405,9 +410,13 @@ impl Hierarchy {
             growing.push(c, Edge::new(edge, 2)),
             0,
         ];
-        for k in 0..3 {
-            growing.push(edge, Edge::new(quad[k], k));
-        }
+        let end = growing.rows.start[p] as usize + 3;
+        growing.rows.edge[end - 3..end].copy_from_slice(&[
+            Edge::new(a, 0),
+            Edge::new(b, 1),
+            Edge::new(c, 2),
+        ]);
+        growing.end[p] = end as u32;
         if d != c {
             own[3] = growing.push(d, Edge::new(edge, 3));
             growing.push(edge, Edge::new(d, 3));
@@ -419,24 +428,22 @@ impl Hierarchy {
                 growing.near[p] |= self.fixed[q as usize];
             }
         }
+        slot
     }
 
-    /// The slots of the edges ab, ac, bc, ad, bd around a new vertex; `rim` as in [`Hierarchy::bisect`].
+    /// The slots of the edges ab (which is known), ac, bc, ad, bd around a new vertex; `rim` as in [`Hierarchy::bisect`].
     #[inline]
-    fn slots_around(&self, quad: &[u32; 4], rim: bool) -> [u32; 5] {
+    fn slots_around(&self, quad: &[u32; 4], ab: usize, rim: bool) -> [u32; 5] {
         let &[a, b, c, d] = quad;
-        let edges = [[a, b], [a, c], [b, c], [a, d], [b, d]];
-        if rim {
-            let nowhere = self.nowhere();
-            edges.map(
-                |[x, y]| match self.fixed[x as usize] || self.fixed[y as usize] {
-                    true => nowhere,
-                    false => self.slot(x, y) as u32,
-                },
-            )
-        } else {
-            edges.map(|[x, y]| self.slot(x, y) as u32)
+        let edges = [[a, c], [b, c], [a, d], [b, d]];
+        let [ac, bc, ad, bd] = edges.map(|[x, y]| self.slot(x, y) as u32);
+        let around = [ab as u32, ac, bc, ad, bd];
+        if !rim {
+            return around;
         }
+        let [a, b, c, d] = quad.map(|q| self.fixed[q as usize]);
+        let fixed = [a || b, a || c, b || c, a || d, b || d];
+        [0, 1, 2, 3, 4].map(|i| if fixed[i] { self.nowhere() } else { around[i] })
     }
 
     /// Numbers the vertices by level, within a level along the leaves.

@@ -316,7 +316,12 @@ impl Run<'_> {
         let values = upper.iter_mut().zip(&mut lower);
         let values = values.zip(z.iter_mut().zip(&mut touching));
         let ranks = hierarchy.rank.iter().zip(problem.boundary());
-        for (j, (((upper, lower), (z, touching)), (&p, &fixed))) in values.zip(ranks).enumerate() {
+        let [f1, f2] = [0, 1].map(|i| problem.loads[i].nodal.iter());
+        let given = ranks.zip(f1.zip(f2)).enumerate();
+        // The larger one, and not what is no number.
+        let larger = |x: f64, than: f64| if x > than { x } else { than };
+        for (((upper, lower), (z, touching)), (j, ((&p, &fixed), (&f1, &f2)))) in values.zip(given)
+        {
             let p = p as usize;
             let u = if fixed {
                 [0, 1].map(|i| problem.heights[i][j])
@@ -324,7 +329,7 @@ impl Run<'_> {
                 displacement(p)
             };
             [*upper, *lower] = u;
-            unit = unit.max(u[0].abs()).max(u[1].abs());
+            unit = larger(u[1].abs(), larger(u[0].abs(), unit));
             let force = force[p];
             finite &= u[0].is_finite() && u[1].is_finite() && force.is_finite();
             if fixed {
@@ -333,16 +338,15 @@ impl Run<'_> {
             *z = force;
             *touching = contact[p];
             let (product, d) = (product(p), diagonal(p));
-            for (i, sign) in [(0, 1.0), (1, -1.0)] {
-                let rest = problem.loads[i].nodal[j] + sign * force - product[i];
-                worst = worst.max(rest.abs() / d[i]);
+            for (i, load) in [f1 + force, f2 - force].into_iter().enumerate() {
+                worst = larger((load - product[i]).abs() / d[i], worst);
             }
             let pressed = if force == 0.0 {
                 0.0
             } else {
                 force / (d[0] / (1.0 + d[0] / d[1]))
             };
-            worst = worst.max((u[0] - u[1]).min(pressed).abs());
+            worst = larger((u[0] - u[1]).min(pressed).abs(), worst);
         }
         let unit = if unit == 0.0 { 1.0 } else { unit };
         let residual = if finite { worst / unit } else { f64::INFINITY };
