@@ -150,10 +150,10 @@ impl<U: Unknowns> Finest<U> {
         let own = self.diagonal[n0..].iter().zip(&x[n0..]);
         for (p, ((quad, a), (&d, &own))) in (n0..n).zip(young.zip(own)) {
             let mut sum = plus(zero, d, own);
-            for (&q, &a) in quad.iter().zip(a) {
-                let q = q as usize;
-                sum = plus(sum, a, x[q]);
-                y[q] = plus(y[q], a, own);
+            for k in 0..4 {
+                let q = quad[k] as usize;
+                sum = plus(sum, a[k], x[q]);
+                y[q] = plus(y[q], a[k], own);
             }
             y[p] = sum;
         }

@@ -471,7 +471,7 @@ impl Hierarchy {
                 self.rank[j as usize] = p as u32;
             }
         }
-        for v in mesh.triangles().iter().flatten() {
+        for v in mesh.triangles().as_flattened() {
             let j = v.index();
             let rank = &mut self.rank[j];
             if *rank == u32::MAX {
