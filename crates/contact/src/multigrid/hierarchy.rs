@@ -12,6 +12,8 @@
 
 use fem_core::{Birth, Mesh, VertexId};
 
+use super::rows::{Edge, FAR, Growing, Rows};
+
 /// The order of elimination, the slots of all edges and the rows to be smoothed.
 ///
 /// Its arrays are kept from one mesh to the next ([`Hierarchy::read`]): fresh memory costs more than what is written to it.
@@ -45,120 +47,6 @@ pub(crate) struct Hierarchy {
     pub old_entry: Vec<Edge>,
     /// The edges of every rank in the mesh itself.
     pub rows: Rows,
-}
-
-/// An edge seen from one of its ends: the rank of the other, and which of the younger one's four slots it has.
-#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
-pub(crate) struct Edge(u32);
-
-impl Edge {
-    #[inline]
-    fn new(other: u32, k: usize) -> Edge {
-        Edge(other << 2 | k as u32)
-    }
-
-    /// The rank of the other end.
-    #[inline]
-    pub fn other(self) -> usize {
-        (self.0 >> 2) as usize
-    }
-}
-
-/// The edges of every rank.
-#[derive(Default)]
-pub(crate) struct Rows {
-    start: Vec<u32>,
-    edge: Vec<Edge>,
-}
-
-/// The place of an edge in a row has no room in a byte: it is searched.
-const FAR: u8 = u8::MAX;
-
-/// The rows of the mesh T_l while it grows.
-struct Growing {
-    rows: Rows,
-    end: Vec<u32>,
-    /// For every slot the place of its edge in the row of the older end; in that of the younger end it is the number of the slot.
-    place: Vec<u8>,
-    /// Whether a row has had an edge to the boundary.
-    near: Vec<bool>,
-}
-
-impl Growing {
-    /// Room for the edges of every rank, none of them there yet.
-    fn new(mut rows: Rows, hierarchy: &Hierarchy) -> Growing {
-        let (n, n0) = (hierarchy.len(), hierarchy.initial());
-        let start = &mut rows.start;
-        refill(start, n + 1, 0);
-        // A vertex never loses an edge when the mesh is refined.
-        for x in 0..n0 {
-            for &y in hierarchy.macro_row(x) {
-                start[x] += 1;
-                start[y as usize] += 1;
-            }
-        }
-        for (p, &[_, _, c, d]) in (n0..).zip(&hierarchy.quad) {
-            start[p] += 3;
-            start[c as usize] += 1;
-            if d != c {
-                start[p] += 1;
-                start[d as usize] += 1;
-            }
-        }
-        let mut total = 0;
-        for start in start.iter_mut() {
-            total += std::mem::replace(start, total);
-        }
-        // What is left from the mesh before is overwritten.
-        rows.edge.resize(total as usize, Edge::default());
-        Growing {
-            end: rows.start[..n].to_vec(),
-            place: vec![0; 4 * hierarchy.quad.len()],
-            near: vec![false; n],
-            rows,
-        }
-    }
-
-    /// Appends an edge to a row; its place.
-    #[inline]
-    fn push(&mut self, x: u32, edge: Edge) -> u8 {
-        let x = x as usize;
-        let end = &mut self.end[x];
-        self.rows.edge[*end as usize] = edge;
-        let place = *end - self.rows.start[x];
-        *end += 1;
-        place.min(u32::from(FAR)) as u8
-    }
-
-    /// Puts an edge in the place of another.
-    #[inline]
-    fn put(&mut self, x: u32, place: u8, other: u32, edge: Edge) -> u8 {
-        if place == FAR {
-            return self.put_far(x, other, edge);
-        }
-        self.rows.edge[self.rows.start[x as usize] as usize + place as usize] = edge;
-        place
-    }
-
-    /// Puts an edge in the place of that to `other`, which is searched.
-    #[cold]
-    fn put_far(&mut self, x: u32, other: u32, edge: Edge) -> u8 {
-        let x = x as usize;
-        let row = self.rows.start[x] as usize..self.end[x] as usize;
-        let row = &mut self.rows.edge[row];
-        let at = row.iter().position(|e| e.other() == other as usize);
-        debug_assert!(at.is_some(), "births contradict the mesh");
-        let at = at.unwrap_or(0);
-        row[at] = edge;
-        at.min(FAR as usize) as u8
-    }
-
-    /// The edges of a rank as far as they are there.
-    #[inline]
-    fn row(&self, x: u32) -> &[Edge] {
-        let x = x as usize;
-        &self.rows.edge[self.rows.start[x] as usize..self.end[x] as usize]
-    }
 }
 
 /// Gives a vector a length and one value everywhere, in the memory that it has if that is enough.

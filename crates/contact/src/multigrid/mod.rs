@@ -1,6 +1,6 @@
 //! Multigrid: conjugate gradients preconditioned by one symmetric cycle over the bisection hierarchy, truncated on the contact set.
 //!
-//! From the bottom up: `hierarchy` (what the births say), `unknowns` (one field or two), `finest` (the matrix of the mesh), `galerkin`
+//! From the bottom up: `hierarchy` (what the births say; `rows` holds its edges), `unknowns` (one field or two), `finest` (the matrix of the mesh), `galerkin`
 //! (those of all levels), `coarse` (the initial mesh; `algebraic`, `aggregates` and `blocks` if it is large), `cycle`, `step` and `descent` (the method), `workspace` (what is kept), `reduced` and here the fields of a
 //! problem one after the other. Where the tensions reduce these are the mean (linear), the gap (an obstacle problem) and sigma; else both displacements
 //! together, glued where they touch, and sigma.
@@ -15,6 +15,7 @@ mod finest;
 mod galerkin;
 mod hierarchy;
 mod reduced;
+mod rows;
 mod step;
 #[cfg(test)]
 mod tests;
