@@ -24,6 +24,10 @@ pub(crate) struct Proportional<'a> {
     /// Name of the model.
     pub reduction: Reduction,
     tension: [f64; 2],
+    /// theta_1, theta_2: the share of either membrane in the tension.
+    shares: [f64; 2],
+    /// The larger tension, and the sum of both in units of it.
+    sum: [f64; 2],
 }
 
 impl<'a> Proportional<'a> {
@@ -34,11 +38,15 @@ impl<'a> Proportional<'a> {
             Tensions::Ratio(c) => (Role::Stiffness, Reduction::ConstantRatio, [1.0, c]),
             Tensions::General => return None,
         };
+        let [t1, t2] = tension;
+        let (large, small) = (t1.max(t2), t1.min(t2));
         Some(Proportional {
             problem,
             role,
             reduction,
             tension,
+            shares: [1.0 / (1.0 + t2 / t1), 1.0 / (1.0 + t1 / t2)],
+            sum: [large, 1.0 + small / large],
         })
     }
 
@@ -57,14 +65,8 @@ impl<'a> Proportional<'a> {
 
     /// The mean s of two displacements.
     pub fn mean_of(&self, u: [f64; 2]) -> f64 {
-        let [s1, s2] = self.shares();
+        let [s1, s2] = self.shares;
         s1 * u[0] + s2 * u[1]
-    }
-
-    /// theta_1, theta_2: the share of either membrane in the tension.
-    fn shares(&self) -> [f64; 2] {
-        let [t1, t2] = self.tension;
-        [1.0 / (1.0 + t2 / t1), 1.0 / (1.0 + t1 / t2)]
     }
 
     /// What the squared norms of mean and gap in the matrix M count in the energy norm of the pair: t_1 + t_2 and t_1 t_2/(t_1 + t_2).
@@ -134,10 +136,9 @@ impl<'a> Proportional<'a> {
 
     /// The load of the mean, (F_1 + F_2)/(t_1 + t_2).
     pub fn mean_load(&self, j: usize) -> f64 {
-        let [t1, t2] = self.tension;
-        let (large, small) = (t1.max(t2), t1.min(t2));
+        let [large, both] = self.sum;
         let sum = self.problem.loads[0].nodal[j] + self.problem.loads[1].nodal[j];
-        sum / large / (1.0 + small / large)
+        sum / large / both
     }
 
     /// Turns multipliers y of the gap into action forces z.
@@ -168,7 +169,7 @@ impl<'a> Proportional<'a> {
     /// Rounding is monotone, so a gap that is not negative stays so, and a closed one closed.
     #[inline]
     pub fn displacements(&self, mean: f64, gap: f64) -> [f64; 2] {
-        let [s1, s2] = self.shares();
+        let [s1, s2] = self.shares;
         [mean + s2 * gap, mean - s1 * gap]
     }
 }

@@ -83,10 +83,10 @@ pub fn solve_in(
     let solution = match settings.solver {
         Solver::Clarabel if !trivial => direct(Method::InteriorPoint)?,
         Solver::Clarabel | Solver::ActiveSet => direct(Method::ActiveSet)?,
-        Solver::Multigrid | Solver::Auto if settings.iterates(problem.order()) => {
+        _ if settings.iterates(problem.order()) => {
             by_multigrid(problem, settings, start, workspace)?
         }
-        Solver::Auto | Solver::Multigrid => {
+        _ => {
             let mut level = Level::new(problem, settings);
             let first = level.solve(Method::ActiveSet, start)?;
             if first.info.status == Status::Converged {
@@ -231,6 +231,19 @@ fn limit(problem: &DiscreteProblem, solution: &Solution, tolerance: Tolerance) -
     limit.max(rounding.min(ROUNDING_LIMIT))
 }
 
+/// The first value that is not finite; a block at a time, since nearly always there is none.
+fn not_finite(values: &[f64]) -> Option<usize> {
+    const BLOCK: usize = 64;
+    let blocks = values.chunks(BLOCK).enumerate();
+    for (block, values) in blocks {
+        if !values.iter().fold(true, |all, v| all & v.is_finite()) {
+            let at = values.iter().position(|v| !v.is_finite());
+            return at.map(|at| BLOCK * block + at);
+        }
+    }
+    None
+}
+
 fn check(problem: &DiscreteProblem, start: Option<&Start>) -> Result<(), SolveError> {
     let expected = problem.order();
     let arrays = [
@@ -256,7 +269,7 @@ fn check(problem: &DiscreteProblem, start: Option<&Start>) -> Result<(), SolveEr
                 found: array.len(),
             });
         }
-        if let Some(vertex) = array.iter().position(|v| !v.is_finite()) {
+        if let Some(vertex) = not_finite(array) {
             return Err(SolveError::NotFinite { what, vertex });
         }
     }

@@ -18,33 +18,40 @@ impl<U: Unknowns> Levels<U> {
         let n0 = hierarchy.initial();
         for level in (1..=hierarchy.depth()).rev() {
             let rows = hierarchy.old_rows(level);
-            for row in rows.clone().rev() {
-                let q = hierarchy.old_vertex[row] as usize;
-                let step = U::times(self.old_pivot[row], r[q]);
-                self.old_step[row] = step;
-                r[q] = U::Value::default();
-                let entries =
-                    hierarchy.old_start[row] as usize..hierarchy.old_start[row + 1] as usize;
-                for (&j, &a) in hierarchy.old_column[entries.clone()]
-                    .iter()
-                    .zip(&self.old_coupling[entries])
-                {
-                    r[j as usize] = U::minus_transposed(r[j as usize], a, step);
+            let vertices = &hierarchy.old_vertex[rows.clone()];
+            let starts = &hierarchy.old_start[rows.start..=rows.end];
+            let pivots = self.old_pivot[rows.clone()].iter();
+            let steps = pivots.zip(&mut self.old_step[rows.clone()]);
+            let mut end = starts[rows.len()] as usize;
+            let backwards = vertices.iter().zip(&starts[..rows.len()]).zip(steps);
+            for ((&q, &start), (&pivot, kept)) in backwards.rev() {
+                let own = &mut r[q as usize];
+                let step = U::times(pivot, *own);
+                *kept = step;
+                *own = U::Value::default();
+                let entries = start as usize..end;
+                end = start as usize;
+                let couplings = &self.old_coupling[entries.clone()];
+                for (&edge, &a) in hierarchy.old_entry[entries].iter().zip(couplings) {
+                    let other = &mut r[edge.other()];
+                    *other = U::minus_transposed(*other, a, step);
                 }
             }
-            for row in rows {
-                self.old_residual[row] = r[hierarchy.old_vertex[row] as usize];
+            for (rest, &q) in self.old_residual[rows].iter_mut().zip(vertices) {
+                *rest = r[q as usize];
             }
             let new = hierarchy.ranks(level);
-            let quads = &hierarchy.quad[new.start - n0..new.end - n0];
-            let couplings = self.coupling[4 * (new.start - n0)..4 * (new.end - n0)].chunks_exact(4);
-            for (((p, quad), a), &pivot) in
-                new.clone().zip(quads).zip(couplings).zip(&self.pivot[new])
-            {
-                let step = U::times(pivot, r[p]);
+            let young = new.start - n0..new.end - n0;
+            let couplings = &self.coupling[4 * young.start..4 * young.end];
+            let couplings = couplings.as_chunks::<4>().0.iter();
+            let (older, own) = r.split_at_mut(new.start);
+            let own = own.iter().zip(&self.pivot[new]);
+            let rows = hierarchy.quad[young].iter().zip(couplings);
+            for ((quad, a), (&rest, &pivot)) in rows.zip(own) {
+                let step = U::times(pivot, rest);
                 for k in 0..4 {
-                    let q = quad[k] as usize;
-                    r[q] = U::minus_transposed(r[q], a[k], step);
+                    let other = &mut older[quad[k] as usize];
+                    *other = U::minus_transposed(*other, a[k], step);
                 }
             }
         }
@@ -55,25 +62,39 @@ impl<U: Unknowns> Levels<U> {
             .solve(hierarchy, &self.coupling[slots], &mut r[..n0], &mut c[..n0]);
         for level in 1..=hierarchy.depth() {
             let new = hierarchy.ranks(level);
-            let quads = &hierarchy.quad[new.start - n0..new.end - n0];
-            let couplings = self.coupling[4 * (new.start - n0)..4 * (new.end - n0)].chunks_exact(4);
-            for (((p, quad), a), &pivot) in
-                new.clone().zip(quads).zip(couplings).zip(&self.pivot[new])
-            {
-                let mut rest = r[p];
+            let young = new.start - n0..new.end - n0;
+            let couplings = &self.coupling[4 * young.start..4 * young.end];
+            let couplings = couplings.as_chunks::<4>().0.iter();
+            let (older, own) = c.split_at_mut(new.start);
+            let own = own.iter_mut().zip(&r[new.clone()]);
+            let own = own.zip(&self.pivot[new]);
+            let rows = hierarchy.quad[young].iter().zip(couplings);
+            for ((quad, a), ((own, &rest), &pivot)) in rows.zip(own) {
+                let mut rest = rest;
                 for k in 0..4 {
-                    rest = U::minus(rest, a[k], c[quad[k] as usize]);
+                    rest = U::minus(rest, a[k], older[quad[k] as usize]);
                 }
-                c[p] = U::times(pivot, rest);
+                *own = U::times(pivot, rest);
             }
             let rows = hierarchy.old_rows(level);
-            for row in rows.clone() {
-                let q = hierarchy.old_vertex[row] as usize;
-                c[q] = U::times(self.old_pivot[row], self.old_rest(hierarchy, row, c));
+            let vertices = &hierarchy.old_vertex[rows.clone()];
+            let mut start = hierarchy.old_start[rows.start] as usize;
+            let ends = &hierarchy.old_start[rows.start + 1..=rows.end];
+            let kept = self.old_residual[rows.clone()].iter();
+            let kept = kept.zip(&self.old_pivot[rows.clone()]);
+            for ((&q, &end), (&rest, &pivot)) in vertices.iter().zip(ends).zip(kept) {
+                let entries = start..end as usize;
+                start = end as usize;
+                let mut rest = rest;
+                let couplings = &self.old_coupling[entries.clone()];
+                for (&edge, &a) in hierarchy.old_entry[entries].iter().zip(couplings) {
+                    rest = U::minus(rest, a, c[edge.other()]);
+                }
+                c[q as usize] = U::times(pivot, rest);
             }
-            for row in rows {
-                let q = hierarchy.old_vertex[row] as usize;
-                c[q] = U::plus(c[q], 1.0, self.old_step[row]);
+            for (&q, &step) in vertices.iter().zip(&self.old_step[rows]) {
+                let c = &mut c[q as usize];
+                *c = U::plus(*c, 1.0, step);
             }
         }
     }
@@ -83,11 +104,11 @@ impl<U: Unknowns> Levels<U> {
     fn old_rest(&self, hierarchy: &Hierarchy, row: usize, c: &[U::Value]) -> U::Value {
         let entries = hierarchy.old_start[row] as usize..hierarchy.old_start[row + 1] as usize;
         let mut rest = self.old_residual[row];
-        for (&j, &a) in hierarchy.old_column[entries.clone()]
+        for (&edge, &a) in hierarchy.old_entry[entries.clone()]
             .iter()
             .zip(&self.old_coupling[entries])
         {
-            rest = U::minus(rest, a, c[j as usize]);
+            rest = U::minus(rest, a, c[edge.other()]);
         }
         rest
     }

@@ -148,6 +148,8 @@ pub(crate) struct Descent<'a, U: Unknowns> {
     pub(super) taken_back: usize,
     /// Whether the levels hold the matrices truncated on `contact`.
     pub(super) swept: bool,
+    /// |r|^2 of a linear problem whose residual is in `scratch` already.
+    pub(super) read_ahead: Option<f64>,
 }
 
 /// What one pass over the residual finds.
@@ -192,6 +194,7 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             monotone_cycles: 0,
             taken_back: 0,
             swept: values.plain,
+            read_ahead: None,
         }
     }
 
@@ -315,29 +318,47 @@ impl<'a, U: Unknowns> Descent<'a, U> {
     ///
     /// The residual that is to be preconditioned, T'r, is left in `scratch`.
     fn read(&mut self) -> Reading {
+        if let Some(residual_squared) = self.read_ahead.take() {
+            return Reading {
+                changed: false,
+                residual_squared,
+            };
+        }
         let mut changed = false;
+        let mut residual_squared = 0.0;
+        let (hierarchy, finest, load_scale) = (self.hierarchy, self.finest, self.load_scale);
+        // The least over the fields of `|A||x| + |load|` in a row: what its rounding errors are relative to.
+        let row_scale = |p: usize, x: &[U::Value]| {
+            let sums = row_magnitude(hierarchy, finest, x, p);
+            let sums = sums[..U::WIDTH].iter().copied();
+            sums.fold(f64::INFINITY, f64::min) + load_scale(p)
+        };
+        let rows = self.x.iter().zip(&self.r).zip(&mut self.scratch);
         if self.inequality {
-            for p in 0..self.x.len() {
-                let r = self.r[p];
-                let mut contact = false;
-                if U::gap(self.x[p]) <= 0.0 {
-                    let pull = U::pull(r, self.finest.share(p));
-                    contact = pull <= 0.0 || pull <= RELEASE * self.row_scale(p);
+            for (p, (((&x, &r), rest), contact)) in rows.zip(&mut self.contact).enumerate() {
+                let mut touching = false;
+                *rest = r;
+                if U::gap(x) <= 0.0 {
+                    let share = finest.share(p);
+                    let pull = U::pull(r, share);
+                    touching = pull <= 0.0 || pull <= RELEASE * row_scale(p, &self.x);
+                    if touching {
+                        *rest = U::gather(r, share);
+                    }
                 }
-                changed |= contact != self.contact[p];
-                self.contact[p] = contact;
-                self.scratch[p] = if contact {
-                    U::gather(r, self.finest.share(p))
-                } else {
-                    r
-                };
+                changed |= touching != *contact;
+                *contact = touching;
+                residual_squared += U::dot(*rest, *rest);
             }
         } else {
-            self.scratch.copy_from_slice(&self.r);
+            for ((_, &r), rest) in rows {
+                *rest = r;
+                residual_squared += U::dot(r, r);
+            }
         }
         Reading {
             changed,
-            residual_squared: dot::<U>(&self.scratch, &self.scratch),
+            residual_squared,
         }
     }
 
@@ -360,16 +381,6 @@ impl<'a, U: Unknowns> Descent<'a, U> {
             rounding += U::dot(y, y);
         }
         (1e-24 * dot::<U>(&self.b, &self.b)).max(f64::EPSILON * f64::EPSILON * rounding)
-    }
-
-    /// The least over the fields of `|A||x| + |load|` in a row: what its rounding errors are relative to.
-    fn row_scale(&self, p: usize) -> f64 {
-        let sums = row_magnitude(self.hierarchy, self.finest, &self.x, p);
-        let least = sums[..U::WIDTH]
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min);
-        least + (self.load_scale)(p)
     }
 }
 

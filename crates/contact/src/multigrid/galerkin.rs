@@ -6,6 +6,9 @@ use super::hierarchy::Hierarchy;
 use super::unknowns::Unknowns;
 use crate::error::SolveError;
 
+/// Up to one vertex in so many in contact, the edges around those alone are truncated.
+const FEW: usize = 4;
+
 /// Rows of every level that are smoothed there, and the solver of the initial mesh.
 #[derive(Default)]
 pub(crate) struct Levels<U: Unknowns> {
@@ -31,10 +34,12 @@ impl<U: Unknowns> Levels<U> {
     /// Memory for the matrices of a hierarchy; no values yet.
     pub fn fit(&mut self, hierarchy: &Hierarchy) {
         let rows = hierarchy.old_vertex.len();
-        self.coupling
-            .resize(hierarchy.slots(), U::Coupling::default());
-        self.pivot.resize(hierarchy.len(), U::Pivot::default());
-        let entries = hierarchy.old_slot.len();
+        // These are filled by every sweep.
+        self.coupling.clear();
+        self.coupling.reserve_exact(hierarchy.slots());
+        self.pivot.clear();
+        self.pivot.reserve_exact(hierarchy.len());
+        let entries = hierarchy.old_entry.len();
         self.old_coupling.resize(entries, U::Coupling::default());
         self.old_pivot.resize(rows, U::Pivot::default());
         self.old_step.resize(rows, U::Value::default());
@@ -59,6 +64,15 @@ impl<U: Unknowns> Levels<U> {
         vector
     }
 
+    /// A vector with given values in the memory of a spare one.
+    pub fn filled(&mut self, values: impl ExactSizeIterator<Item = U::Value>) -> Vec<U::Value> {
+        let mut vector = self.spare.pop().unwrap_or_default();
+        vector.clear();
+        vector.reserve_exact(values.len());
+        vector.extend(values);
+        vector
+    }
+
     /// The matrices of all levels with the hat functions truncated on `contact`, which is empty for none; O(N).
     ///
     /// With c_p = (c_a + c_b)/2 for the vertex p that halved the edge ab, its couplings al, be, ga, de to a, b, c, d and its diagonal
@@ -74,23 +88,28 @@ impl<U: Unknowns> Levels<U> {
         if !plain && self.initial.plain_first() {
             self.sweep(hierarchy, finest, &[])?;
         }
-        self.fill(hierarchy, finest, contact);
+        self.fill(hierarchy, finest, if plain { &[] } else { contact });
         let n0 = hierarchy.initial();
         for level in (1..=hierarchy.depth()).rev() {
             self.copy_old_rows(hierarchy, finest, level);
-            for p in hierarchy.ranks(level) {
-                let quad = &hierarchy.quad[p - n0];
-                let [ab, ac, bc, ad, bd] = hierarchy.around[p - n0].map(|s| s as usize);
-                let own = 4 * (p - n0);
-                let [al, be, ga, de] = [0, 1, 2, 3].map(|k| self.coupling[own + k]);
-                let pivot = self.pivot[p];
-                let [a, b, c, d] = *quad;
-                let parents = [a as usize, b as usize];
-                for (q, to) in parents.into_iter().zip([al, be]) {
-                    self.pivot[q] = U::inherit(self.pivot[q], to, pivot);
+            let ranks = hierarchy.ranks(level);
+            let young = ranks.start - n0..ranks.end - n0;
+            let vertices = hierarchy.quad[young.clone()].iter();
+            let vertices = vertices.zip(&hierarchy.around[young.clone()]);
+            let (older, pivots) = self.pivot.split_at_mut(ranks.start);
+            let pivots = pivots.iter_mut().zip(&finest.diagonal[ranks]);
+            let coupling = &mut self.coupling[..];
+            for ((own, (quad, around)), (pivot, &diagonal)) in young.zip(vertices).zip(pivots) {
+                let (own, _) = coupling[4 * own..4 * own + 4].as_chunks::<4>();
+                let [al, be, ga, de] = own[0];
+                let &[a, b, c, d] = quad;
+                for (q, to) in [(a, al), (b, be)] {
+                    let parent = &mut older[q as usize];
+                    *parent = U::inherit(*parent, to, *pivot);
                 }
-                let row_a = U::rejoin(al, be, pivot);
-                self.coupling[ab] = if a > b { row_a } else { U::transpose(row_a) };
+                let [ab, ac, bc, ad, bd] = around.map(|slot| slot as usize);
+                let row_a = U::rejoin(al, be, *pivot);
+                coupling[ab] = if a > b { row_a } else { U::transpose(row_a) };
                 for (slot, row, column, half) in [
                     (ac, a, c, ga),
                     (bc, b, c, ga),
@@ -102,9 +121,10 @@ impl<U: Unknowns> Levels<U> {
                     } else {
                         U::transpose(half)
                     };
-                    self.coupling[slot] = U::plus_half(self.coupling[slot], half);
+                    let entry = &mut coupling[slot];
+                    *entry = U::plus_half(*entry, half);
                 }
-                self.pivot[p] = U::inverse(pivot, finest.diagonal[p]);
+                *pivot = U::inverse(*pivot, diagonal);
             }
         }
         let edges = 4 * hierarchy.quad.len();
@@ -118,55 +138,72 @@ impl<U: Unknowns> Levels<U> {
         )
     }
 
-    /// The truncated matrix of the finest mesh.
+    /// The matrix of the finest mesh, truncated on `contact`, which is empty for none.
     fn fill(&mut self, hierarchy: &Hierarchy, finest: &Finest<U>, contact: &[bool]) {
-        let n0 = hierarchy.initial();
-        let free = contact.is_empty() || !contact.contains(&true);
-        let glued = |q: usize| (!free && contact[q]).then(|| finest.share(q));
-        for p in 0..hierarchy.len() {
-            self.pivot[p] = if hierarchy.fixed[p] {
-                U::Pivot::default()
-            } else {
-                U::truncated_pivot(finest.diagonal[p], glued(p))
-            };
+        let diagonal = finest.diagonal.iter();
+        self.pivot.clear();
+        self.pivot
+            .extend(diagonal.map(|&d| U::truncated_pivot(d, None)));
+        hierarchy.clear_fixed(&mut self.pivot);
+        let slots = finest.slot.iter();
+        self.coupling.clear();
+        self.coupling
+            .extend(slots.map(|&a| U::truncated(a, None, None)));
+        // Nothing joins the boundary in the first place.
+        let touching = contact.iter().zip(&hierarchy.fixed).enumerate();
+        let touching = touching.filter(|(_, (contact, fixed))| **contact && !**fixed);
+        let mut count = 0;
+        for (p, _) in touching.clone() {
+            self.pivot[p] = U::truncated_pivot(finest.diagonal[p], Some(finest.share(p)));
+            count += 1;
         }
-        let slots = finest.slot.chunks_exact(4);
-        let couplings = self.coupling.chunks_exact_mut(4).zip(slots);
-        if free {
-            for (to, from) in couplings.take(hierarchy.quad.len()) {
-                for k in 0..4 {
-                    to[k] = U::truncated(from[k], None, None);
+        let glued = |q: usize| contact[q].then(|| finest.share(q));
+        if count * FEW <= contact.len() {
+            for (p, _) in touching {
+                for (q, slot) in hierarchy.edges(p).filter(|&(q, _)| !hierarchy.fixed[q]) {
+                    let (row, column) = (p.max(q), p.min(q));
+                    self.coupling[slot] =
+                        U::truncated(finest.slot[slot], glued(row), glued(column));
                 }
             }
-        } else {
-            for ((p, quad), (to, from)) in hierarchy.quad.iter().enumerate().zip(couplings) {
+            return;
+        }
+        let n0 = hierarchy.initial();
+        let (own, initial) = self.coupling.split_at_mut(4 * hierarchy.quad.len());
+        let (own, _) = own.as_chunks_mut::<4>();
+        let young = hierarchy.quad.iter().zip(own).zip(&contact[n0..]);
+        for (p, ((quad, own), &row)) in young.enumerate() {
+            let column = quad.map(|q| contact[q as usize]);
+            if row || column != [false; 4] {
                 let row = glued(n0 + p);
                 for k in 0..4 {
-                    to[k] = U::truncated(from[k], row, glued(quad[k] as usize));
+                    let entry = finest.slot[4 * p + k];
+                    own[k] = U::truncated(entry, row, glued(quad[k] as usize));
                 }
             }
         }
-        let edges = 4 * hierarchy.quad.len();
         for x in 0..n0 {
-            let list = hierarchy.macro_start[x] as usize..hierarchy.macro_start[x + 1] as usize;
-            for m in list {
-                self.coupling[edges + m] = U::truncated(
-                    finest.slot[edges + m],
-                    glued(x),
-                    glued(hierarchy.macro_end[m] as usize),
-                );
+            let first = hierarchy.macro_start[x] as usize;
+            for (m, &y) in (first..).zip(hierarchy.macro_row(x)) {
+                let entry = finest.slot[4 * hierarchy.quad.len() + m];
+                initial[m] = U::truncated(entry, glued(x), glued(y as usize));
             }
         }
     }
 
     fn copy_old_rows(&mut self, hierarchy: &Hierarchy, finest: &Finest<U>, level: usize) {
-        for row in hierarchy.old_rows(level) {
-            let q = hierarchy.old_vertex[row];
-            self.old_pivot[row] = U::inverse(self.pivot[q as usize], finest.diagonal[q as usize]);
-            let entries = hierarchy.old_start[row] as usize..hierarchy.old_start[row + 1] as usize;
-            for e in entries {
-                let c = self.coupling[hierarchy.old_slot[e] as usize];
-                self.old_coupling[e] = if q > hierarchy.old_column[e] {
+        let rows = hierarchy.old_rows(level);
+        let mut start = hierarchy.old_start[rows.start] as usize;
+        let pivots = self.old_pivot[rows.clone()].iter_mut();
+        let ends = &hierarchy.old_start[rows.start + 1..=rows.end];
+        for ((pivot, &end), &q) in pivots.zip(ends).zip(&hierarchy.old_vertex[rows]) {
+            *pivot = U::inverse(self.pivot[q as usize], finest.diagonal[q as usize]);
+            let entries = start..end as usize;
+            start = end as usize;
+            let couplings = self.old_coupling[entries.clone()].iter_mut();
+            for (to, &edge) in couplings.zip(&hierarchy.old_entry[entries]) {
+                let c = self.coupling[hierarchy.slot_of(q, edge)];
+                *to = if q as usize > edge.other() {
                     c
                 } else {
                     U::transpose(c)

@@ -10,7 +10,9 @@
 //! T_l are a prefix of every array. Every edge of every T_l was made together with its younger end p and joins it to one of a, b, c, d:
 //! it is slot 4 (p - n_0) + k of a flat array, n_0 the size of the initial mesh, whose own edges follow behind.
 
-use fem_core::{Birth, Mesh, Neighbour, VertexId};
+use fem_core::{Birth, Mesh, VertexId};
+
+use super::rows::{Edge, FAR, Growing, Rows};
 
 /// The order of elimination, the slots of all edges and the rows to be smoothed.
 ///
@@ -41,89 +43,10 @@ pub(crate) struct Hierarchy {
     pub old_vertex: Vec<u32>,
     /// Start of every old row's entries, and their number.
     pub old_start: Vec<u32>,
-    /// Rank of the other end of every entry; no end lies on the boundary.
-    pub old_column: Vec<u32>,
-    /// Slot of every entry.
-    pub old_slot: Vec<u32>,
+    /// Every entry: its edge, seen from the old vertex; no end lies on the boundary.
+    pub old_entry: Vec<Edge>,
     /// The edges of every rank in the mesh itself.
     pub rows: Rows,
-}
-
-/// The rows of the mesh T_l while it grows: other end and slot of every edge.
-#[derive(Default)]
-pub(crate) struct Rows {
-    start: Vec<u32>,
-    end: Vec<u32>,
-    entry: Vec<[u32; 2]>,
-}
-
-impl Rows {
-    /// Makes room for the edges of every rank, none of them there yet.
-    fn clear(&mut self, degree: &[u32], vertex: &[u32]) {
-        refill(&mut self.start, vertex.len(), 0);
-        let mut total = 0u32;
-        for (start, &j) in self.start.iter_mut().zip(vertex) {
-            *start = total;
-            // A vertex never loses an edge when the mesh is refined.
-            total += degree[j as usize];
-        }
-        self.end.clear();
-        self.end.extend_from_slice(&self.start);
-        // What is left from the mesh before is overwritten.
-        self.entry.resize(total as usize, [0; 2]);
-    }
-
-    #[inline]
-    fn push(&mut self, x: u32, other: u32, slot: u32) {
-        let end = &mut self.end[x as usize];
-        self.entry[*end as usize] = [other, slot];
-        *end += 1;
-    }
-
-    #[inline]
-    fn row_mut(&mut self, x: u32) -> &mut [[u32; 2]] {
-        &mut self.entry[self.start[x as usize] as usize..self.end[x as usize] as usize]
-    }
-
-    /// All edges are there: every row ends where the next begins.
-    fn complete(&mut self) {
-        self.start.push(self.entry.len() as u32);
-        self.end = Vec::new();
-    }
-
-    /// The edges of a rank: other end and slot. Complete rows only.
-    #[inline]
-    pub fn row(&self, x: u32) -> &[[u32; 2]] {
-        &self.entry[self.start[x as usize] as usize..self.start[x as usize + 1] as usize]
-    }
-
-    /// The edges of a rank as far as they are there.
-    #[inline]
-    fn present(&self, x: u32) -> &[[u32; 2]] {
-        &self.entry[self.start[x as usize] as usize..self.end[x as usize] as usize]
-    }
-
-    /// Puts (p, slot) in the place of the edge to `from`; the slots of that edge and of those to `c` and `d`.
-    #[inline]
-    fn replace(&mut self, x: u32, from: u32, to: [u32; 2], c: u32, d: u32) -> [u32; 3] {
-        let mut found = [u32::MAX; 3];
-        for entry in self.row_mut(x) {
-            let [other, slot] = *entry;
-            if other == from {
-                found[0] = slot;
-                *entry = to;
-            } else {
-                if other == c {
-                    found[1] = slot;
-                }
-                if other == d {
-                    found[2] = slot;
-                }
-            }
-        }
-        debug_assert!(!found.contains(&u32::MAX), "births contradict the mesh");
-        found
-    }
 }
 
 /// Gives a vector a length and one value everywhere, in the memory that it has if that is enough.
@@ -133,13 +56,25 @@ pub(crate) fn refill<T: Clone>(vector: &mut Vec<T>, len: usize, value: T) {
     vector.resize(len, value);
 }
 
+/// Which of four neighbours one of them is; the first, if it is two of them.
+#[inline]
+fn number_in(quad: &[u32; 4], y: u32) -> usize {
+    // Which one it is cannot be foretold: no branches.
+    let mut k = 3;
+    for i in [2, 1, 0] {
+        k = if quad[i] == y { i } else { k };
+    }
+    debug_assert!(quad[k] == y, "no edge joins these vertices");
+    k
+}
+
 impl Hierarchy {
     /// Reads the hierarchy of a mesh off its births; O(N), no searching beyond the edges of a vertex.
     ///
     /// `initial` is the order of the vertices of the initial mesh, where it is known; else they follow the leaves of this one. With `flat`
     /// the births are left aside, and the mesh itself counts as the initial one.
     pub fn read(&mut self, mesh: &Mesh, initial: Option<&[u32]>, flat: bool) {
-        let degree = self.number(mesh, initial, flat);
+        self.number(mesh, initial, flat);
         let n0 = self.initial();
         let boundary = mesh.boundary();
         self.fixed.clear();
@@ -160,7 +95,7 @@ impl Hierarchy {
             [a, b, c, d.map_or(c, |d| rank[d.index()])]
         }));
         self.macro_edges(mesh);
-        self.grow(&degree);
+        self.grow();
     }
 
     /// The order of the vertices of the initial mesh, for [`Hierarchy::read`] on the next mesh.
@@ -214,119 +149,205 @@ impl Hierarchy {
         (4 * self.quad.len() + self.macro_end.len()) as u32
     }
 
-    /// The slot of an edge of the mesh between two inner ranks, the larger first.
+    /// The slot of an edge of some T_l between two ranks.
     #[inline]
-    pub fn slot(&self, x: usize, y: usize) -> Option<usize> {
-        let n0 = self.initial();
+    pub fn slot(&self, x: u32, y: u32) -> usize {
+        let n0 = self.level[1];
+        let (x, y) = (x.max(y), x.min(y));
         if x >= n0 {
-            let q = &self.quad[x - n0];
-            let k = q.iter().position(|&v| v as usize == y)?;
-            Some(4 * (x - n0) + k)
+            let k = number_in(&self.quad[(x - n0) as usize], y);
+            4 * (x - n0) as usize + k
         } else {
-            let list = self.macro_start[x] as usize..self.macro_start[x + 1] as usize;
-            let k = self.macro_end[list.clone()]
-                .iter()
-                .position(|&v| v as usize == y)?;
-            Some(4 * self.quad.len() + list.start + k)
+            self.macro_slot(x, y)
         }
+    }
+
+    /// The slot of an edge of the initial mesh, the larger rank first.
+    #[cold]
+    fn macro_slot(&self, x: u32, y: u32) -> usize {
+        let at = self.macro_row(x as usize).iter().position(|&v| v == y);
+        debug_assert!(at.is_some(), "no edge joins these vertices");
+        let first = self.macro_start[x as usize] as usize;
+        4 * self.quad.len() + first + at.unwrap_or(0)
+    }
+
+    /// The smaller ranks that the edges of the initial mesh join to one of its ranks.
+    #[inline]
+    pub fn macro_row(&self, x: usize) -> &[u32] {
+        &self.macro_end[self.macro_start[x] as usize..self.macro_start[x + 1] as usize]
+    }
+
+    /// The slot of an edge that is seen from x.
+    #[inline]
+    pub fn slot_of(&self, x: u32, edge: Edge) -> usize {
+        // Both ends would call the edge so if it were theirs; it is the younger one's.
+        let theirs = edge.0.max(x << 2 | edge.0 & 3);
+        match theirs.checked_sub(4 * self.level[1]) {
+            Some(slot) => slot as usize,
+            None => {
+                let other = edge.0 >> 2;
+                self.macro_slot(x.max(other), x.min(other))
+            }
+        }
+    }
+
+    /// The edges of a rank in the mesh itself: other end and slot.
+    #[inline]
+    pub fn edges(&self, x: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let row = self.rows.start[x] as usize..self.rows.start[x + 1] as usize;
+        let edges = self.rows.edge[row].iter();
+        edges.map(move |&edge| (edge.other(), self.slot_of(x as u32, edge)))
     }
 
     /// Bisects level by level, and notes the slots around every new vertex and the rows of its parents.
-    fn grow(&mut self, degree: &[u32]) {
-        let nowhere = self.nowhere();
+    fn grow(&mut self) {
         let n0 = self.initial();
-        let mut rows = std::mem::take(&mut self.rows);
-        rows.clear(degree, &self.vertex);
-        self.around.clear();
-        self.around.reserve_exact(self.quad.len());
-        self.old_level.clear();
-        self.old_level.push(0);
-        self.old_vertex.clear();
-        self.old_start.clear();
-        self.old_start.push(0);
-        self.old_column.clear();
-        self.old_slot.clear();
-        for x in 0..n0 {
-            for m in self.macro_start[x]..self.macro_start[x + 1] {
-                let y = self.macro_end[m as usize];
-                let slot = if self.fixed[x] || self.fixed[y as usize] {
-                    nowhere
-                } else {
-                    4 * self.quad.len() as u32 + m
-                };
-                rows.push(x as u32, y, slot);
-                rows.push(y, x as u32, slot);
-            }
-        }
-        // The level in which a vertex was listed as old last.
-        let mut listed = vec![0u16; self.len()];
-        for level in 1..=self.depth() {
-            for p in self.ranks(level) {
-                let quad = self.quad[p - n0];
-                let [a, b, c, d] = quad;
-                let edge = p as u32;
-                let mut own = [nowhere; 4];
-                if !self.fixed[p] {
-                    for k in 0..4 {
-                        if !self.fixed[quad[k] as usize] {
-                            own[k] = (4 * (p - n0) + k) as u32;
-                        }
-                    }
-                }
-                let [ab, ac, ad] = rows.replace(a, b, [edge, own[0]], c, d);
-                let [_, bc, bd] = rows.replace(b, a, [edge, own[1]], c, d);
-                rows.push(c, edge, own[2]);
-                for k in 0..3 {
-                    rows.push(edge, quad[k], own[k]);
-                }
-                if d != c {
-                    rows.push(d, edge, own[3]);
-                    rows.push(edge, d, own[3]);
-                }
-                self.around.push([ab, ac, bc, ad, bd]);
-            }
-            for p in self.ranks(level) {
-                for q in &self.quad[p - n0][..2] {
-                    let seen = &mut listed[*q as usize];
-                    if self.fixed[*q as usize] || *seen == level as u16 {
-                        continue;
-                    }
-                    *seen = level as u16;
-                    self.old_vertex.push(*q);
-                    for &[other, slot] in rows.present(*q) {
-                        if slot != nowhere {
-                            self.old_column.push(other);
-                            self.old_slot.push(slot);
-                        }
-                    }
-                    self.old_start.push(self.old_column.len() as u32);
-                }
-            }
-            self.old_level.push(self.old_vertex.len() as u32);
-        }
-        rows.complete();
-        for grown in [
+        let mut growing = Growing::new(std::mem::take(&mut self.rows), self);
+        let mut around = std::mem::take(&mut self.around);
+        around.clear();
+        around.reserve_exact(self.quad.len());
+        let [mut old_level, mut old_vertex, mut old_start] = [
+            &mut self.old_level,
             &mut self.old_vertex,
             &mut self.old_start,
-            &mut self.old_column,
-            &mut self.old_slot,
-        ] {
-            grown.shrink_to_fit();
+        ]
+        .map(std::mem::take);
+        old_level.clear();
+        old_level.push(0);
+        old_vertex.clear();
+        old_start.clear();
+        old_start.push(0);
+        let mut old_entry = std::mem::take(&mut self.old_entry);
+        old_entry.clear();
+        for x in 0..n0 {
+            for &y in self.macro_row(x) {
+                growing.push(x as u32, Edge::new(y, 0));
+                growing.push(y, Edge::new(x as u32, 0));
+                growing.near[x] |= self.fixed[y as usize];
+                growing.near[y as usize] |= self.fixed[x];
+            }
         }
-        self.rows = rows;
+        // The level in which a vertex was listed as old last; one on the boundary never is.
+        let never = |&fixed: &bool| if fixed { u16::MAX } else { 0 };
+        let mut listed: Vec<u16> = self.fixed.iter().map(never).collect();
+        for level in 1..=self.depth() {
+            let first = old_vertex.len();
+            let ranks = self.ranks(level);
+            let quads = &self.quad[ranks.start - n0..ranks.end - n0];
+            for (p, quad) in ranks.zip(quads) {
+                let rim = self.fixed[p] || quad.iter().any(|&q| self.fixed[q as usize]);
+                let ab = self.bisect(&mut growing, p, quad, rim);
+                around.push(self.slots_around(quad, ab, rim));
+                for &q in &quad[..2] {
+                    let seen = &mut listed[q as usize];
+                    if *seen < level as u16 {
+                        *seen = level as u16;
+                        old_vertex.push(q);
+                    }
+                }
+            }
+            for &q in &old_vertex[first..] {
+                let row = growing.row(q);
+                if growing.near[q as usize] {
+                    let inner = |edge: &&Edge| !self.fixed[edge.other()];
+                    old_entry.extend(row.iter().filter(inner));
+                } else {
+                    old_entry.extend_from_slice(row);
+                }
+                old_start.push(old_entry.len() as u32);
+            }
+            old_level.push(old_vertex.len() as u32);
+        }
+        old_vertex.shrink_to_fit();
+        old_start.shrink_to_fit();
+        old_entry.shrink_to_fit();
+        self.around = around;
+        self.old_level = old_level;
+        self.old_vertex = old_vertex;
+        self.old_start = old_start;
+        self.old_entry = old_entry;
+        self.rows = growing.rows;
     }
 
-    /// Numbers the vertices by level, within a level along the leaves; the number of edges of every vertex of the mesh.
-    fn number(&mut self, mesh: &Mesh, initial: Option<&[u32]>, flat: bool) -> Vec<u32> {
+    /// Bisects the edge ab at p: in the rows of a and b the edge to p stands where that between them stood. `rim` tells whether one of the
+    /// five lies on the boundary. The slot of ab.
+    #[inline]
+    fn bisect(&self, growing: &mut Growing, p: usize, quad: &[u32; 4], rim: bool) -> usize {
+        let n0 = self.initial();
+        let &[a, b, c, d] = quad;
+        let (young, old) = (a.max(b), a.min(b));
+        let mut place = [FAR; 2];
+        let slot = if young as usize >= n0 {
+            let at = young as usize - n0;
+            let k = number_in(&self.quad[at], old);
+            let slot = 4 * at + k;
+            let other = growing.place[slot];
+            place = if a > b {
+                [k as u8, other]
+            } else {
+                [other, k as u8]
+            };
+            slot
+        } else {
+            self.macro_slot(young, old)
+        };
+        let edge = p as u32;
+        let mut own = [
+            growing.put(a, place[0], b, Edge::new(edge, 0)),
+            growing.put(b, place[1], a, Edge::new(edge, 1)),
+            growing.push(c, Edge::new(edge, 2)),
+            0,
+        ];
+        let end = growing.rows.start[p] as usize + 3;
+        growing.rows.edge[end - 3..end].copy_from_slice(&[
+            Edge::new(a, 0),
+            Edge::new(b, 1),
+            Edge::new(c, 2),
+        ]);
+        growing.end[p] = end as u32;
+        if d != c {
+            own[3] = growing.push(d, Edge::new(edge, 3));
+            growing.push(edge, Edge::new(d, 3));
+        }
+        growing.place[4 * (p - n0)..][..4].copy_from_slice(&own);
+        if rim {
+            for &q in quad {
+                growing.near[q as usize] |= self.fixed[p];
+                growing.near[p] |= self.fixed[q as usize];
+            }
+        }
+        slot
+    }
+
+    /// The slots of the edges ab (which is known), ac, bc, ad, bd around a new vertex; `rim` as in [`Hierarchy::bisect`].
+    #[inline]
+    fn slots_around(&self, quad: &[u32; 4], ab: usize, rim: bool) -> [u32; 5] {
+        let &[a, b, c, d] = quad;
+        let edges = [[a, c], [b, c], [a, d], [b, d]];
+        let [ac, bc, ad, bd] = edges.map(|[x, y]| self.slot(x, y) as u32);
+        let around = [ab as u32, ac, bc, ad, bd];
+        if !rim {
+            return around;
+        }
+        let [a, b, c, d] = quad.map(|q| self.fixed[q as usize]);
+        let fixed = [a || b, a || c, b || c, a || d, b || d];
+        [0, 1, 2, 3, 4].map(|i| if fixed[i] { self.nowhere() } else { around[i] })
+    }
+
+    /// Numbers the vertices by level, within a level along the leaves.
+    fn number(&mut self, mesh: &Mesh, initial: Option<&[u32]>, flat: bool) {
         let births = mesh.genealogy();
         let level = |birth: &Birth| if flat { 0 } else { birth.level as usize };
-        let depth = births.iter().map(level).max().unwrap_or(0);
-        refill(&mut self.level, depth + 2, 0);
+        refill(&mut self.level, 2, 0);
         for birth in births {
-            self.level[level(birth) + 1] += 1;
+            let after = level(birth) + 1;
+            if after >= self.level.len() {
+                self.level.resize(after + 1, 0);
+            }
+            self.level[after] += 1;
         }
-        for l in 0..=depth {
-            self.level[l + 1] += self.level[l];
+        for l in 1..self.level.len() {
+            self.level[l] += self.level[l - 1];
         }
         let n0 = self.level[1] as usize;
         let mut next = self.level.clone();
@@ -338,21 +359,16 @@ impl Hierarchy {
                 self.rank[j as usize] = p as u32;
             }
         }
-        let mut degree = vec![0u32; births.len()];
-        for (v, around) in mesh.triangles().iter().zip(mesh.neighbours()) {
-            for (i, v) in v.iter().enumerate() {
-                let j = v.index();
-                // Every corner of a triangle begins one edge of it; an edge on the boundary has no triangle that would count its end.
-                degree[j] += 1 + u32::from(around[(i + 1) % 3] == Neighbour::BOUNDARY);
-                if self.rank[j] == u32::MAX {
-                    let at = &mut next[level(&births[j])];
-                    self.vertex[*at as usize] = j as u32;
-                    self.rank[j] = *at;
-                    *at += 1;
-                }
+        for v in mesh.triangles().as_flattened() {
+            let j = v.index();
+            let rank = &mut self.rank[j];
+            if *rank == u32::MAX {
+                let at = &mut next[level(&births[j])];
+                self.vertex[*at as usize] = j as u32;
+                *rank = *at;
+                *at += 1;
             }
         }
-        degree
     }
 
     /// The edges of the initial mesh, by their larger rank: those that are edges still, and those that were bisected.

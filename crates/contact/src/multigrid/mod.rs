@@ -1,6 +1,6 @@
 //! Multigrid: conjugate gradients preconditioned by one symmetric cycle over the bisection hierarchy, truncated on the contact set.
 //!
-//! From the bottom up: `hierarchy` (what the births say), `unknowns` (one field or two), `finest` (the matrix of the mesh), `galerkin`
+//! From the bottom up: `hierarchy` (what the births say; `rows` holds its edges), `unknowns` (one field or two), `finest` (the matrix of the mesh), `galerkin`
 //! (those of all levels), `coarse` (the initial mesh; `algebraic`, `aggregates` and `blocks` if it is large), `cycle`, `step` and `descent` (the method), `workspace` (what is kept), `reduced` and here the fields of a
 //! problem one after the other. Where the tensions reduce these are the mean (linear), the gap (an obstacle problem) and sigma; else both displacements
 //! together, glued where they touch, and sigma.
@@ -15,6 +15,7 @@ mod finest;
 mod galerkin;
 mod hierarchy;
 mod reduced;
+mod rows;
 mod step;
 #[cfg(test)]
 mod tests;
@@ -241,18 +242,21 @@ impl Run<'_> {
         plain: bool,
     ) -> Vectors<U> {
         let hierarchy = self.hierarchy;
-        let n = hierarchy.len();
-        let [mut x, mut b] = [(); 2].map(|()| levels.vector(n));
-        for (p, &j) in hierarchy.vertex.iter().enumerate() {
-            let inner = !hierarchy.fixed[p];
-            let j = j as usize;
-            x[p] = if inner {
-                initial(j)
-            } else {
+        let rows = || hierarchy.vertex.iter().zip(&hierarchy.fixed);
+        let x = levels.filled(rows().map(|(&j, &fixed)| {
+            if fixed {
                 U::Value::default()
-            };
-            b[p] = if inner { load(j) } else { U::Value::default() };
-        }
+            } else {
+                initial(j as usize)
+            }
+        }));
+        let mut b = levels.filled(rows().map(|(&j, &fixed)| {
+            if fixed {
+                U::Value::default()
+            } else {
+                load(j as usize)
+            }
+        }));
         finest.add_boundary(-1.0, &boundary, &mut b);
         let on_boundary = hierarchy.boundary.iter();
         let sizes = on_boundary.map(|&p| U::size(boundary(hierarchy.vertex[p as usize] as usize)));
@@ -306,37 +310,48 @@ impl Run<'_> {
         let problem = self.problem;
         let hierarchy = self.hierarchy;
         let n = hierarchy.len();
-        let mut own = [vec![0.0; n], vec![0.0; n]];
-        let (mut z, mut touching) = (vec![0.0; n], vec![false; n]);
+        let [mut upper, mut lower, mut z] = [(); 3].map(|()| vec![0.0; n]);
+        let mut touching = vec![false; n];
         let mut unit = 0.0f64;
         let (mut finite, mut worst) = (true, 0.0f64);
-        for (p, &j) in hierarchy.vertex.iter().enumerate() {
-            let j = j as usize;
-            let fixed = hierarchy.fixed[p];
+        let values = upper.iter_mut().zip(&mut lower);
+        let values = values.zip(z.iter_mut().zip(&mut touching));
+        let ranks = hierarchy.rank.iter().zip(problem.boundary());
+        let [f1, f2] = [0, 1].map(|i| problem.loads[i].nodal.iter());
+        let given = ranks.zip(f1.zip(f2)).enumerate();
+        // The larger one, and not what is no number.
+        let larger = |x: f64, than: f64| if x > than { x } else { than };
+        for (((upper, lower), (z, touching)), (j, ((&p, &fixed), (&f1, &f2)))) in values.zip(given)
+        {
+            let p = p as usize;
             let u = if fixed {
                 [0, 1].map(|i| problem.heights[i][j])
             } else {
                 displacement(p)
             };
-            [own[0][j], own[1][j]] = u;
-            unit = unit.max(u[0].abs()).max(u[1].abs());
-            finite &= u[0].is_finite() && u[1].is_finite() && force[p].is_finite();
+            [*upper, *lower] = u;
+            unit = larger(u[1].abs(), larger(u[0].abs(), unit));
+            let force = force[p];
+            finite &= u[0].is_finite() && u[1].is_finite() && force.is_finite();
             if fixed {
                 continue;
             }
-            z[j] = force[p];
-            touching[j] = contact[p];
+            *z = force;
+            *touching = contact[p];
             let (product, d) = (product(p), diagonal(p));
-            for (i, sign) in [(0, 1.0), (1, -1.0)] {
-                let rest = problem.loads[i].nodal[j] + sign * force[p] - product[i];
-                worst = worst.max(rest.abs() / d[i]);
+            for (i, load) in [f1 + force, f2 - force].into_iter().enumerate() {
+                worst = larger((load - product[i]).abs() / d[i], worst);
             }
-            let harmonic = d[0] / (1.0 + d[0] / d[1]);
-            worst = worst.max((u[0] - u[1]).min(force[p] / harmonic).abs());
+            let pressed = if force == 0.0 {
+                0.0
+            } else {
+                force / (d[0] / (1.0 + d[0] / d[1]))
+            };
+            worst = larger((u[0] - u[1]).min(pressed).abs(), worst);
         }
         let unit = if unit == 0.0 { 1.0 } else { unit };
         let residual = if finite { worst / unit } else { f64::INFINITY };
-        ((own, z, touching), residual)
+        (([upper, lower], z, touching), residual)
     }
 
     /// sigma and the record.
@@ -447,8 +462,8 @@ fn row_magnitude<U: Unknowns>(
         }
     };
     add(finest.diagonal[p], p);
-    for &[q, slot] in hierarchy.rows.row(p as u32) {
-        add(finest.at(slot), q as usize);
+    for (q, slot) in hierarchy.edges(p) {
+        add(finest.slot[slot], q);
     }
     sum
 }

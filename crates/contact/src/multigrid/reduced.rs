@@ -62,16 +62,20 @@ impl Run<'_> {
         };
 
         levels.forget();
+        levels.spare.clear();
         beside.forget();
 
         // The pull on a closed gap becomes the force, where it is more than rounding.
-        let n = hierarchy.len();
         let largest = gap.x.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let mut force = gap.r;
-        for p in 0..n {
-            let r = force[p];
-            let held = gap.contact[p] && !hierarchy.fixed[p] && r < 0.0;
-            force[p] = if held && {
+        for (p, (force, (&touching, &fixed))) in force
+            .iter_mut()
+            .zip(gap.contact.iter().zip(&hierarchy.fixed))
+            .enumerate()
+        {
+            let r = *force;
+            let held = touching && !fixed && r < 0.0;
+            *force = if held && {
                 let scale = model.gap_load(hierarchy.vertex[p] as usize).1;
                 // Nearly all are far above what the largest gap could leave in their row.
                 -r > FAR * ROW_ROUNDING * (scale + finest.diagonal[p] * largest)
@@ -82,29 +86,28 @@ impl Run<'_> {
                 0.0
             };
         }
-        let [mut upper, mut lower] = [mean.x, gap.x];
-        for p in 0..n {
-            if !hierarchy.fixed[p] {
-                [upper[p], lower[p]] = model.displacements(upper[p], lower[p]);
-            }
-        }
-        let mut product = |i: usize, u: &[f64]| {
-            let mut y = levels.vector(n);
-            finest.multiply(hierarchy, u, &mut y);
-            finest.add_boundary(1.0, |j| problem.heights[i][j], &mut y);
-            y
-        };
-        let products = [product(0, &upper), product(1, &lower)];
+        let fields = mean.x.iter().zip(&gap.x).zip(&hierarchy.fixed);
+        let displacement: Vec<[f64; 2]> = fields
+            .map(|((&mean, &gap), &fixed)| {
+                if fixed {
+                    [0.0; 2]
+                } else {
+                    model.displacements(mean, gap)
+                }
+            })
+            .collect();
+        drop([mean.x, gap.x]);
+        let heights = |j: usize| [0, 1].map(|i| problem.heights[i][j]);
+        let product = finest.multiply_both(hierarchy, &displacement, heights);
         let stiffness = model.tension();
         let (solved, kkt_residual) = self.conclude(
-            |p| [upper[p], lower[p]],
-            |p| [0, 1].map(|i| stiffness[i] * products[i][p]),
+            |p| displacement[p],
+            |p| [0, 1].map(|i| stiffness[i] * product[p][i]),
             |p| [0, 1].map(|i| stiffness[i] * finest.diagonal[p]),
             &force,
             &gap.contact,
         );
-        levels.spare.extend(products);
-        levels.spare.extend([upper, lower, force]);
+        drop((displacement, product, force));
         let (displacement, force, contact) = solved;
         let error_squared =
             mean_weight * mean.report.error_squared + gap_weight * gap.report.error_squared;

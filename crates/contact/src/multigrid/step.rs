@@ -82,22 +82,37 @@ impl<U: Unknowns> Descent<'_, U> {
             None => std::mem::swap(&mut self.direction, &mut self.correction),
         }
         self.multiply_direction();
-        let curvature = dot::<U>(&self.direction, &self.image);
-        let slope = dot::<U>(&self.direction, &self.r);
+        let (mut curvature, mut slope) = (0.0, 0.0);
+        let moves = self.direction.iter().zip(&self.image);
+        for ((&d, &y), &r) in moves.zip(&self.r) {
+            curvature += U::dot(d, y);
+            slope += U::dot(d, r);
+        }
         if !(curvature > 0.0 && slope > 0.0 && curvature.is_finite()) {
             self.curvature = None;
             return Ok(None);
         }
         self.curvature = Some(curvature);
         let length = slope / curvature;
-        let mut closed = Vec::new();
         let rows = self.x.iter_mut().zip(&mut self.r);
         let moves = self.direction.iter().zip(&self.image);
+        if !self.inequality {
+            let mut squared = 0.0;
+            for (((x, r), (&d, &y)), rest) in rows.zip(moves).zip(&mut self.scratch) {
+                *x = U::plus(*x, length, d);
+                *r = U::plus(*r, -length, y);
+                *rest = *r;
+                squared += U::dot(*r, *r);
+            }
+            self.read_ahead = Some(squared);
+            return Ok(Some(length * slope));
+        }
+        let mut closed = Vec::new();
         for ((p, (x, r)), (&d, &y)) in rows.enumerate().zip(moves) {
             let moved = U::plus(*x, length, d);
             *r = U::plus(*r, -length, y);
             *x = moved;
-            if self.inequality && U::gap(moved) < 0.0 {
+            if U::gap(moved) < 0.0 {
                 *x = U::close(moved, self.finest.share(p));
                 closed.push((p, U::plus(*x, -1.0, moved), *r));
             }
@@ -144,10 +159,9 @@ impl<U: Unknowns> Descent<'_, U> {
         for &(p, change, _) in changes {
             let own = U::plain_times(-1.0, finest.diagonal[p]);
             self.r[p] = U::plus_plain(self.r[p], own, change);
-            for &[q, slot] in hierarchy.rows.row(p as u32) {
-                let q = q as usize;
+            for (q, slot) in hierarchy.edges(p) {
                 if !hierarchy.fixed[q] {
-                    let a = U::plain_times(-1.0, finest.at(slot));
+                    let a = U::plain_times(-1.0, finest.slot[slot]);
                     self.r[q] = U::plus_plain(self.r[q], a, change);
                 }
             }

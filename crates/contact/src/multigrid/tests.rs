@@ -17,7 +17,23 @@ fn problem(levels: usize) -> DiscreteProblem {
 
 /// As [`problem`], the initial mesh of n by n cells.
 fn problem_on(n: usize, levels: usize) -> DiscreteProblem {
-    let mut mesh: Mesh = distorted(n, 0.3, 7);
+    problem_from(distorted(n, 0.3, 7), levels)
+}
+
+/// A mesh all of whose triangles meet in one vertex, refined.
+fn fan(triangles: u32, levels: usize) -> DiscreteProblem {
+    let mut points = vec![[0.0, 0.0]];
+    points.extend((0..triangles).map(|k| {
+        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(triangles);
+        [angle.cos(), angle.sin()]
+    }));
+    let corners: Vec<[u32; 3]> = (0..triangles)
+        .map(|k| [0, 1 + k, 1 + (k + 1) % triangles])
+        .collect();
+    problem_from(Mesh::new(points, &corners, &[], None).unwrap(), levels)
+}
+
+fn problem_from(mut mesh: Mesh, levels: usize) -> DiscreteProblem {
     let mut random = Random(11);
     for _ in 0..levels {
         let marked: Vec<_> = mesh
@@ -38,8 +54,13 @@ fn problem_on(n: usize, levels: usize) -> DiscreteProblem {
 
 /// Random contact, about half of the inner vertices.
 fn contact(hierarchy: &Hierarchy, random: &mut Random) -> Vec<bool> {
+    contact_of(0.5, hierarchy, random)
+}
+
+/// Random contact, about this part of the inner vertices.
+fn contact_of(part: f64, hierarchy: &Hierarchy, random: &mut Random) -> Vec<bool> {
     (0..hierarchy.len())
-        .map(|p| !hierarchy.fixed[p] && random.next() < 0.5)
+        .map(|p| !hierarchy.fixed[p] && random.next() < part)
         .collect()
 }
 
@@ -85,8 +106,8 @@ fn finest<U: Unknowns>(problem: &DiscreteProblem, hierarchy: &Hierarchy) -> Fine
 
 #[test]
 fn levels_are_prefixes_and_every_edge_has_its_slot() {
-    for levels in [0, 1, 9] {
-        let problem = problem(levels);
+    // In the fan more edges meet than a byte can count.
+    for problem in [problem(0), problem(1), problem(9), fan(600, 4)] {
         let h = hierarchy(&problem);
         assert_eq!(h.around.len(), h.quad.len());
         assert_eq!(h.level.last(), Some(&(h.len() as u32)));
@@ -99,11 +120,16 @@ fn levels_are_prefixes_and_every_edge_has_its_slot() {
             for &k in problem.pattern().columns(j) {
                 let q = h.rank[k as usize] as usize;
                 if q < p {
-                    assert!(h.slot(p, q).is_some_and(|s| s < h.slots() - 1));
+                    let slot = h.slot(q as u32, p as u32);
+                    assert!(slot < h.slots() - 1 && h.edges(p).any(|e| e == (q, slot)));
                     seen += 1;
                 }
             }
             assert!(p < h.initial() || seen <= 4);
+            let others = h.edges(p).map(|(q, _)| h.vertex[q]);
+            let mut row: Vec<u32> = others.chain([j as u32]).collect();
+            row.sort_unstable();
+            assert_eq!(row, problem.pattern().columns(j));
         }
         // Old rows: the inner parents of the level, once each.
         for level in 1..=h.depth() {
@@ -156,12 +182,12 @@ fn hat<U: Unknowns>(h: &Hierarchy, level: usize, rank: usize, i: usize) -> Vec<U
 }
 
 /// Every stored row of every level is the Galerkin product of truncated hat functions.
-fn galerkin<U: Unknowns>(contact_seed: Option<u64>) {
+fn galerkin<U: Unknowns>(contact: Option<(u64, f64)>) {
     let problem = problem(6);
     let h = hierarchy(&problem);
     let finest = finest::<U>(&problem, &h);
-    let contact = match contact_seed {
-        Some(seed) => contact(&h, &mut Random(seed)),
+    let contact = match contact {
+        Some((seed, part)) => contact_of(part, &h, &mut Random(seed)),
         None => vec![false; h.len()],
     };
     let mut levels = levels::<U>(&h);
@@ -196,7 +222,7 @@ fn galerkin<U: Unknowns>(contact_seed: Option<u64>) {
             let q = h.old_vertex[row] as usize;
             for e in h.old_start[row] as usize..h.old_start[row + 1] as usize {
                 for (i, j) in [(0, 0), (0, U::WIDTH - 1), (U::WIDTH - 1, 0)] {
-                    let other = h.old_column[e] as usize;
+                    let other = h.old_entry[e].other();
                     let exact = entry(&function(level, q, i), &function(level, other, j));
                     let found = U::coupling_at(levels.old_coupling[e], i, j);
                     assert!((found - exact).abs() < 1e-12, "{found} {exact}");
@@ -210,7 +236,8 @@ fn galerkin<U: Unknowns>(contact_seed: Option<u64>) {
 
 #[test]
 fn rows_of_all_levels_are_galerkin_products() {
-    for contact in [None, Some(1), Some(2)] {
+    // Few vertices in contact are truncated one by one.
+    for contact in [None, Some((1, 0.5)), Some((2, 0.5)), Some((3, 0.1))] {
         galerkin::<Scalar>(contact);
         galerkin::<Pair>(contact);
     }
