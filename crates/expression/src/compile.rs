@@ -7,6 +7,7 @@
 
 use crate::function::{Binary, Unary};
 use crate::graph::{Graph, Id, Node};
+use crate::quotient::Divisor;
 
 /// Where an instruction finds a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +24,8 @@ pub(crate) enum Operand {
 pub(crate) enum Op {
     Unary(Unary, u32, Operand),
     Binary(Binary, u32, Operand, Operand),
+    /// A quotient by a constant.
+    Quotient(u32, Operand, Divisor),
     /// Target, condition, then, else.
     Select(u32, Operand, Operand, Operand),
     Copy(u32, Operand),
@@ -124,6 +127,11 @@ impl Compiler<'_> {
         }
         let target = self.new_register();
         let op = match self.graph.node(id) {
+            Node::Binary(Binary::Div, a, b)
+                if let Some(divisor) = self.graph.as_number(b).and_then(Divisor::new) =>
+            {
+                Op::Quotient(target, self.operand(a), divisor)
+            }
             Node::Unary(op, a) => Op::Unary(op, target, self.operand(a)),
             Node::Binary(op, a, b) => Op::Binary(op, target, self.operand(a), self.operand(b)),
             Node::If(c, a, b) => {
@@ -176,9 +184,12 @@ impl Compiler<'_> {
         let open = self.ops.len() > start + 1;
         match self.ops.last_mut() {
             // Computed by the last instruction of this branch, so nobody else has it: compute it into the target.
-            Some(Op::Unary(_, last, _) | Op::Binary(_, last, ..) | Op::Select(last, ..))
-                if open && Operand::Register(*last) == source =>
-            {
+            Some(
+                Op::Unary(_, last, _)
+                | Op::Binary(_, last, ..)
+                | Op::Quotient(last, ..)
+                | Op::Select(last, ..),
+            ) if open && Operand::Register(*last) == source => {
                 *last = target;
             }
             _ => self.ops.push(Op::Copy(target, source)),
@@ -248,7 +259,10 @@ impl Compiler<'_> {
 impl Op {
     fn operands_mut(&mut self) -> impl Iterator<Item = &mut Operand> {
         let list = match self {
-            Self::Unary(_, _, a) | Self::Copy(_, a) | Self::Split(a, _) => [Some(a), None, None],
+            Self::Unary(_, _, a)
+            | Self::Quotient(_, a, _)
+            | Self::Copy(_, a)
+            | Self::Split(a, _) => [Some(a), None, None],
             Self::Binary(_, _, a, b) => [Some(a), Some(b), None],
             Self::Select(_, c, a, b) => [Some(c), Some(a), Some(b)],
             Self::Else(_) | Self::Join => [None, None, None],
@@ -260,6 +274,7 @@ impl Op {
         match self {
             Self::Unary(_, t, _)
             | Self::Binary(_, t, ..)
+            | Self::Quotient(t, ..)
             | Self::Select(t, ..)
             | Self::Copy(t, _) => Some(t),
             Self::Split(..) | Self::Else(_) | Self::Join => None,
@@ -337,7 +352,7 @@ mod tests {
             Op::Unary(Unary::Sin, ..) => 's',
             Op::Unary(Unary::Cos, ..) => 'c',
             Op::Binary(Binary::Mul, ..) => 'p',
-            Op::Unary(..) | Op::Binary(..) => '.',
+            Op::Unary(..) | Op::Binary(..) | Op::Quotient(..) => '.',
             Op::Select(..) => '?',
             Op::Copy(..) => '=',
             Op::Split(..) => '(',

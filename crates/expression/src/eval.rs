@@ -170,6 +170,7 @@ fn run(
             }
             Op::Unary(_, target, _)
             | Op::Binary(_, target, ..)
+            | Op::Quotient(target, ..)
             | Op::Select(target, ..)
             | Op::Copy(target, _) => target as usize,
         };
@@ -190,6 +191,9 @@ fn run(
                     inputs.fetch(b, registers),
                     list,
                 );
+            }
+            Op::Quotient(_, a, divisor) => {
+                loops.quotient(into, inputs.fetch(a, registers), divisor, list);
             }
             Op::Select(_, c, a, b) => {
                 let of = [c, a, b].map(|operand| inputs.fetch(operand, registers));

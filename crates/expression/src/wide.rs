@@ -1,9 +1,11 @@
-//! The loops over a block of points, compiled twice: for every processor of the target, and for those with registers of four numbers (AVX2).
+//! The loops over a block of points, compiled twice: for every processor of the target, and for those with registers of four numbers and
+//! with fused operations (AVX2 and FMA).
 //!
-//! Both do the same IEEE operations on every point, and products and sums are never fused, so that they give the same bits.
+//! Both do the same IEEE operations on every point, and products and sums of the formula are never fused, so that they give the same bits.
 
 use crate::eval::{Source, apply_binary, apply_unary, choose};
 use crate::function::{Binary, Unary};
+use crate::quotient::Divisor;
 
 /// The loops of the instructions; `list` holds the points to work on, all of them if there is none.
 pub(crate) trait Loops: Copy {
@@ -17,6 +19,9 @@ pub(crate) trait Loops: Copy {
         b: Source<'_>,
         list: Option<&[u8]>,
     );
+
+    /// Divides by a constant.
+    fn quotient(self, into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>);
 
     /// `of` holds the condition and the values where it is true and false.
     fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>);
@@ -42,6 +47,11 @@ impl Loops for Plain {
         apply_binary(op, into, a, b, list);
     }
 
+    // Without an instruction for it, a fused operation is slower than a division.
+    fn quotient(self, into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>) {
+        apply_binary(Binary::Div, into, a, Source::Same(by.value), list);
+    }
+
     fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
         choose(into, of, list);
     }
@@ -53,12 +63,12 @@ pub(crate) use x86::Wide;
 #[cfg(target_arch = "x86_64")]
 #[allow(
     unsafe_code,
-    reason = "functions for AVX2 are called: a `Wide` exists only where the processor was found to have it"
+    reason = "functions for AVX2 and FMA are called: a `Wide` exists only where the processor was found to have it"
 )]
 mod x86 {
-    use super::{Binary, Loops, Source, Unary, apply_binary, apply_unary, choose};
+    use super::{Binary, Divisor, Loops, Source, Unary, apply_binary, apply_unary, choose};
 
-    /// The proof that the processor has AVX2; made by [`Wide::detect`] alone.
+    /// The proof that the processor has AVX2 and FMA; made by [`Wide::detect`] alone.
     #[derive(Clone, Copy)]
     pub(crate) struct Wide(());
 
@@ -66,13 +76,14 @@ mod x86 {
         /// Asks the processor; the answer is kept by the standard library.
         #[inline]
         pub(crate) fn detect() -> Option<Wide> {
-            is_x86_feature_detected!("avx2").then_some(Wide(()))
+            (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"))
+                .then_some(Wide(()))
         }
     }
 
     impl Loops for Wide {
         fn unary(self, op: Unary, into: &mut [f64], a: Source<'_>, list: Option<&[u8]>) {
-            // SAFETY: the processor has AVX2, or there were no `self`.
+            // SAFETY: the processor has both, or there were no `self`.
             unsafe { unary(op, into, a, list) }
         }
 
@@ -84,27 +95,40 @@ mod x86 {
             b: Source<'_>,
             list: Option<&[u8]>,
         ) {
-            // SAFETY: the processor has AVX2, or there were no `self`.
+            // SAFETY: the processor has both, or there were no `self`.
             unsafe { binary(op, into, a, b, list) }
         }
 
+        fn quotient(self, into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>) {
+            // SAFETY: the processor has both, or there were no `self`.
+            unsafe { quotient(into, a, by, list) }
+        }
+
         fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
-            // SAFETY: the processor has AVX2, or there were no `self`.
+            // SAFETY: the processor has both, or there were no `self`.
             unsafe { select(into, of, list) }
         }
     }
 
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,fma")]
     fn unary(op: Unary, into: &mut [f64], a: Source<'_>, list: Option<&[u8]>) {
         apply_unary(op, into, a, list);
     }
 
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,fma")]
     fn binary(op: Binary, into: &mut [f64], a: Source<'_>, b: Source<'_>, list: Option<&[u8]>) {
         apply_binary(op, into, a, b, list);
     }
 
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,fma")]
+    fn quotient(into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>) {
+        match (a, list) {
+            (Source::Each(a), None) => by.divide(into, a),
+            _ => apply_binary(Binary::Div, into, a, Source::Same(by.value), list),
+        }
+    }
+
+    #[target_feature(enable = "avx2,fma")]
     fn select(into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
         choose(into, of, list);
     }
@@ -173,6 +197,18 @@ mod tests {
                     &|out| wide.unary(op, out, Source::Each(&a), list),
                     format!("{op:?}"),
                 );
+            }
+            for p in sources(&a) {
+                for value in [3.0, -0.75, 12.0] {
+                    let Some(by) = Divisor::new(value) else {
+                        continue;
+                    };
+                    same(
+                        &|out| Plain.quotient(out, p, by, list),
+                        &|out| wide.quotient(out, p, by, list),
+                        format!("divided by {value}"),
+                    );
+                }
             }
             for (p, q) in sources(&a)
                 .into_iter()
