@@ -3,7 +3,7 @@
 //!
 //! Both do the same IEEE operations on every point, and products and sums of the formula are never fused, so that they give the same bits.
 
-use crate::eval::{Source, apply_binary, apply_unary, choose};
+use crate::eval::{Source, apply_binary, apply_unary, choose, count};
 use crate::function::{Binary, Unary};
 use crate::quotient::Divisor;
 
@@ -19,6 +19,9 @@ pub(crate) trait Loops: Copy {
         b: Source<'_>,
         list: Option<&[u8]>,
     );
+
+    /// How many of the values are true.
+    fn count(self, values: &[f64]) -> usize;
 
     /// Divides by a constant.
     fn quotient(self, into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>);
@@ -47,6 +50,10 @@ impl Loops for Plain {
         apply_binary(op, into, a, b, list);
     }
 
+    fn count(self, values: &[f64]) -> usize {
+        count(values)
+    }
+
     // Without an instruction for it, a fused operation is slower than a division.
     fn quotient(self, into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>) {
         apply_binary(Binary::Div, into, a, Source::Same(by.value), list);
@@ -66,7 +73,10 @@ pub(crate) use x86::Wide;
     reason = "functions for AVX2 and FMA are called: a `Wide` exists only where the processor was found to have it"
 )]
 mod x86 {
-    use super::{Binary, Divisor, Loops, Source, Unary, apply_binary, apply_unary, choose};
+    use super::{
+        Binary, Divisor, Loops, Source, Unary, apply_binary, apply_unary, choose,
+        count as count_true,
+    };
 
     /// The proof that the processor has AVX2 and FMA; made by [`Wide::detect`] alone.
     #[derive(Clone, Copy)]
@@ -99,6 +109,11 @@ mod x86 {
             unsafe { binary(op, into, a, b, list) }
         }
 
+        fn count(self, values: &[f64]) -> usize {
+            // SAFETY: the processor has both, or there were no `self`.
+            unsafe { count(values) }
+        }
+
         fn quotient(self, into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>) {
             // SAFETY: the processor has both, or there were no `self`.
             unsafe { quotient(into, a, by, list) }
@@ -118,6 +133,11 @@ mod x86 {
     #[target_feature(enable = "avx2,fma")]
     fn binary(op: Binary, into: &mut [f64], a: Source<'_>, b: Source<'_>, list: Option<&[u8]>) {
         apply_binary(op, into, a, b, list);
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    fn count(values: &[f64]) -> usize {
+        count_true(values)
     }
 
     #[target_feature(enable = "avx2,fma")]

@@ -44,6 +44,39 @@ impl ExpressionField {
         value * self.factors[0] * self.factors[1]
     }
 
+    /// Whether a scaled value may be used. Without a branch, so that many are tested at a time.
+    #[inline]
+    fn is_good(&self, scaled: f64) -> bool {
+        scaled.is_finite() & (!self.positive | (scaled > 0.0))
+    }
+
+    /// The values in the user's units.
+    fn evaluate(&self, at: Samples<'_>, out: &mut [f64]) {
+        if self.length == 1.0 {
+            return self.expression.eval(at.x, at.y, at.region, out);
+        }
+        let mut x = [0.0; BLOCK];
+        let mut y = [0.0; BLOCK];
+        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
+            let n = out.len();
+            let range = block * BLOCK..block * BLOCK + n;
+            for (to, from) in [(&mut x, at.x), (&mut y, at.y)] {
+                for (to, from) in to.iter_mut().zip(&from[range.clone()]) {
+                    *to = from * self.length;
+                }
+            }
+            let region = at.region.get(range).unwrap_or_default();
+            self.expression.eval(&x[..n], &y[..n], region, out);
+        }
+    }
+
+    /// The value at one of the points, in the user's units: what [`Self::evaluate`] gives there.
+    fn value_at(&self, at: Samples<'_>, k: usize) -> f64 {
+        let region = at.region.get(k).copied().unwrap_or_default();
+        let [x, y] = [at.x[k], at.y[k]].map(|c| c * self.length);
+        self.expression.eval_at(x, y, region)
+    }
+
     fn refuse(&self, value: f64, at: Samples<'_>, k: usize) -> FieldError {
         FieldError {
             name: self.name.clone(),
@@ -56,32 +89,25 @@ impl ExpressionField {
 
 impl Field for ExpressionField {
     fn sample(&self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
-        let mut x = [0.0; BLOCK];
-        let mut y = [0.0; BLOCK];
-        for start in (0..at.len()).step_by(BLOCK) {
-            let end = at.len().min(start + BLOCK);
-            let n = end - start;
-            for k in 0..n {
-                x[k] = at.x[start + k] * self.length;
-                y[k] = at.y[start + k] * self.length;
-            }
-            let region = at.region.get(start..end).unwrap_or_default();
-            let out = &mut out[start..end];
-            self.expression.eval(&x[..n], &y[..n], region, out);
-            for (k, value) in out.iter_mut().enumerate() {
-                let scaled = self.scaled(*value);
-                if !scaled.is_finite() || (self.positive && scaled <= 0.0) {
-                    return Err(self.refuse(*value, at, start + k));
-                }
-                *value = scaled;
-            }
+        self.evaluate(at, out);
+        // Nearly always all are good: one test for all of them.
+        let mut good = true;
+        for value in &mut *out {
+            *value = self.scaled(*value);
+            good &= self.is_good(*value);
         }
-        Ok(())
+        if good {
+            return Ok(());
+        }
+        match out.iter().position(|value| !self.is_good(*value)) {
+            Some(k) => Err(self.refuse(self.value_at(at, k), at, k)),
+            None => Ok(()),
+        }
     }
 
     fn constant(&self) -> Option<f64> {
         let value = self.scaled(self.expression.constant()?);
-        (value.is_finite() && !(self.positive && value <= 0.0)).then_some(value)
+        self.is_good(value).then_some(value)
     }
 }
 
