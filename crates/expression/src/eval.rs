@@ -2,6 +2,7 @@
 
 use crate::compile::{Op, Operand, Program};
 use crate::function::{Binary, Unary};
+use crate::term::{By, TermValues};
 #[cfg(target_arch = "x86_64")]
 use crate::wide::Wide;
 use crate::wide::{Loops, Plain};
@@ -117,7 +118,7 @@ pub(crate) enum Source<'a> {
 
 impl Source<'_> {
     #[inline(always)]
-    fn at(self, point: usize) -> f64 {
+    pub(crate) fn at(self, point: usize) -> f64 {
         match self {
             Self::Each(values) => values[point],
             Self::Same(value) => value,
@@ -181,7 +182,7 @@ fn run(
             }
             Op::Unary(_, target, _)
             | Op::Binary(_, target, ..)
-            | Op::Quotient(target, ..)
+            | Op::Term(target, ..)
             | Op::Select(target, ..)
             | Op::Copy(target, _) => target as usize,
         };
@@ -203,8 +204,17 @@ fn run(
                     list,
                 );
             }
-            Op::Quotient(_, a, divisor) => {
-                loops.quotient(into, inputs.fetch(a, registers), divisor, list);
+            Op::Term(_, term, sum) => {
+                let values = TermValues {
+                    factor: term.factor,
+                    of: inputs.fetch(term.of, registers),
+                    by: match term.by {
+                        By::Times(b) => By::Times(inputs.fetch(b, registers)),
+                        By::Over(divisor) => By::Over(divisor),
+                    },
+                    sum: sum.map(|(join, c)| (join, inputs.fetch(c, registers))),
+                };
+                loops.term(into, values, list);
             }
             Op::Select(_, c, a, b) => {
                 let of = [c, a, b].map(|operand| inputs.fetch(operand, registers));

@@ -58,7 +58,9 @@ mod lower;
 mod names;
 mod parser;
 mod quotient;
+mod registers;
 mod scope;
+mod term;
 mod token;
 mod wide;
 

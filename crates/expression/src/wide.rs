@@ -5,7 +5,7 @@
 
 use crate::eval::{Source, apply_binary, apply_unary, choose, count};
 use crate::function::{Binary, Unary};
-use crate::quotient::Divisor;
+use crate::term::TermValues;
 
 /// The loops of the instructions; `list` holds the points to work on, all of them if there is none.
 pub(crate) trait Loops: Copy {
@@ -23,8 +23,7 @@ pub(crate) trait Loops: Copy {
     /// How many of the values are true.
     fn count(self, values: &[f64]) -> usize;
 
-    /// Divides by a constant.
-    fn quotient(self, into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>);
+    fn term(self, into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>);
 
     /// `of` holds the condition and the values where it is true and false.
     fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>);
@@ -55,8 +54,8 @@ impl Loops for Plain {
     }
 
     // Without an instruction for it, a fused operation is slower than a division.
-    fn quotient(self, into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>) {
-        apply_binary(Binary::Div, into, a, Source::Same(by.value), list);
+    fn term(self, into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>) {
+        term.compute(into, list, false);
     }
 
     fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
@@ -74,7 +73,7 @@ pub(crate) use x86::Wide;
 )]
 mod x86 {
     use super::{
-        Binary, Divisor, Loops, Source, Unary, apply_binary, apply_unary, choose,
+        Binary, Loops, Source, TermValues, Unary, apply_binary, apply_unary, choose,
         count as count_true,
     };
 
@@ -114,9 +113,9 @@ mod x86 {
             unsafe { count(values) }
         }
 
-        fn quotient(self, into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>) {
+        fn term(self, into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>) {
             // SAFETY: the processor has both, or there were no `self`.
-            unsafe { quotient(into, a, by, list) }
+            unsafe { compute(into, term, list) }
         }
 
         fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
@@ -141,11 +140,8 @@ mod x86 {
     }
 
     #[target_feature(enable = "avx2,fma")]
-    fn quotient(into: &mut [f64], a: Source<'_>, by: Divisor, list: Option<&[u8]>) {
-        match (a, list) {
-            (Source::Each(a), None) => by.divide(into, a),
-            _ => apply_binary(Binary::Div, into, a, Source::Same(by.value), list),
-        }
+    fn compute(into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>) {
+        term.compute(into, list, true);
     }
 
     #[target_feature(enable = "avx2,fma")]
@@ -157,6 +153,8 @@ mod x86 {
 #[cfg(all(test, target_arch = "x86_64"))]
 mod tests {
     use super::*;
+    use crate::quotient::Divisor;
+    use crate::term::{By, Join};
 
     const UNARY: [Unary; 21] = {
         use Unary::*;
@@ -190,6 +188,25 @@ mod tests {
             .collect()
     }
 
+    /// A term by the operations that it is made of.
+    fn one_by_one(term: TermValues<'_>, into: &mut [f64], list: Option<&[u8]>) {
+        let [mut scaled, mut product] = [vec![0.0; into.len()], vec![0.0; into.len()]];
+        let factor = Source::Same(term.factor);
+        Plain.binary(Binary::Mul, &mut scaled, factor, term.of, None);
+        let (op, by) = match term.by {
+            By::Times(b) => (Binary::Mul, b),
+            By::Over(divisor) => (Binary::Div, Source::Same(divisor.value)),
+        };
+        Plain.binary(op, &mut product, Source::Each(&scaled), by, None);
+        let t = Source::Each(&product);
+        match term.sum {
+            None => Plain.binary(Binary::Mul, into, t, Source::Same(1.0), list),
+            Some((Join::Plus, c)) => Plain.binary(Binary::Add, into, t, c, list),
+            Some((Join::Minus, c)) => Plain.binary(Binary::Sub, into, t, c, list),
+            Some((Join::From, c)) => Plain.binary(Binary::Sub, into, c, t, list),
+        }
+    }
+
     #[test]
     fn wide_loops_give_the_bits_of_plain_ones() {
         let Some(wide) = Wide::detect() else {
@@ -218,18 +235,6 @@ mod tests {
                     format!("{op:?}"),
                 );
             }
-            for p in sources(&a) {
-                for value in [3.0, -0.75, 12.0] {
-                    let Some(by) = Divisor::new(value) else {
-                        continue;
-                    };
-                    same(
-                        &|out| Plain.quotient(out, p, by, list),
-                        &|out| wide.quotient(out, p, by, list),
-                        format!("divided by {value}"),
-                    );
-                }
-            }
             for (p, q) in sources(&a)
                 .into_iter()
                 .flat_map(|p| sources(&b).map(|q| (p, q)))
@@ -239,6 +244,31 @@ mod tests {
                         &|out| Plain.binary(op, out, p, q, list),
                         &|out| wide.binary(op, out, p, q, list),
                         format!("{op:?}"),
+                    );
+                }
+                let by = [3.0, -0.75, 12.0].map(|value| By::Over(Divisor::new(value).unwrap()));
+                let joins = [Join::Plus, Join::Minus, Join::From].into_iter();
+                let sums = joins.flat_map(|join| sources(&c).map(|c| Some((join, c))));
+                for (by, sum) in by
+                    .into_iter()
+                    .chain([By::Times(q)])
+                    .flat_map(|by| sums.clone().chain([None]).map(move |sum| (by, sum)))
+                {
+                    let term = TermValues {
+                        factor: if sum.is_none() { 1.0 } else { 0.7 },
+                        of: p,
+                        by,
+                        sum,
+                    };
+                    same(
+                        &|out| one_by_one(term, out, list),
+                        &|out| wide.term(out, term, list),
+                        "term".into(),
+                    );
+                    same(
+                        &|out| one_by_one(term, out, list),
+                        &|out| Plain.term(out, term, list),
+                        "term".into(),
                     );
                 }
                 same(
