@@ -281,3 +281,50 @@ impl Table {
         );
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers from -1 to 1.
+    fn numbers(seed: u64) -> impl Iterator<Item = f64> {
+        let mut state = seed;
+        std::iter::repeat_with(move || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        })
+    }
+
+    #[test]
+    fn wide_loops_give_the_bits_of_plain_ones() {
+        let table = Table::new();
+        for count in [1, 4, 21, BLOCK] {
+            let block = || {
+                let mut block = Block::new();
+                block.count = count;
+                let rows = block.corners.iter_mut().flatten();
+                for (k, row) in rows.enumerate() {
+                    row.iter_mut()
+                        .zip(numbers(k as u64))
+                        .for_each(|(to, from)| *to = from);
+                }
+                block
+            };
+            let (mut plain, mut wide) = (block(), block());
+            plain.place(&table);
+            lanes::place(&mut wide, &table);
+            assert_eq!((plain.x, plain.y, plain.area), (wide.x, wide.y, wide.area));
+            let mut values = Values([0.0; BLOCK * POINTS]);
+            for (k, (to, from)) in values.0.iter_mut().zip(numbers(7)).enumerate() {
+                // The first elements have the same value at all points.
+                *to = if k % block().stride() < 2 { 0.3 } else { from };
+            }
+            let (mut plain, mut wide) = (Fits::NONE, Fits::NONE);
+            table.fit(&values, block().stride(), &mut plain);
+            lanes::fit(&table, &values, block().stride(), &mut wide);
+            assert_eq!(format!("{plain:?}"), format!("{wide:?}"));
+        }
+    }
+}
