@@ -20,6 +20,10 @@ struct Register([f64; BLOCK]);
 
 /// Working memory, kept by each thread.
 struct Scratch {
+    #[expect(
+        clippy::vec_box,
+        reason = "registers are swapped, which is not to move their values"
+    )]
     registers: Vec<Box<Register>>,
     /// The points of the open branches, as a stack of lists.
     points: Vec<u8>,

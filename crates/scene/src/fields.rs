@@ -4,14 +4,14 @@ use expression::Expression;
 use fem_core::scale::times_power_of_two;
 use fem_core::{Field, FieldError, Samples};
 
-/// Points evaluated at once.
-const BLOCK: usize = 256;
-
 /// An expression of the physical coordinates, read at scaled points.
 #[derive(Clone, Debug)]
 pub(crate) struct ExpressionField {
     name: String,
+    /// As it was written.
     expression: Expression,
+    /// The same for scaled points, with scaled values.
+    scaled_expression: Expression,
     /// 2^a, a the exponent of length.
     length: f64,
     /// Two factors whose product is 2^-e, e the exponent of the values: 2^-e alone may not be a number.
@@ -23,11 +23,14 @@ impl ExpressionField {
     /// The field `expression`, which errors call `name`, with points in units of 2^length and values in units of 2^value.
     pub fn new(name: &str, expression: &Expression, length: i32, value: i32) -> Self {
         let half = -value / 2;
+        let factors = [half, -value - half].map(|e| times_power_of_two(1.0, e));
+        let length = times_power_of_two(1.0, length);
         ExpressionField {
             name: name.to_owned(),
             expression: expression.clone(),
-            length: times_power_of_two(1.0, length),
-            factors: [half, -value - half].map(|e| times_power_of_two(1.0, e)),
+            scaled_expression: expression.in_units(length, factors),
+            length,
+            factors,
             positive: false,
         }
     }
@@ -50,27 +53,7 @@ impl ExpressionField {
         scaled.is_finite() & (!self.positive | (scaled > 0.0))
     }
 
-    /// The values in the user's units.
-    fn evaluate(&self, at: Samples<'_>, out: &mut [f64]) {
-        if self.length == 1.0 {
-            return self.expression.eval(at.x, at.y, at.region, out);
-        }
-        let mut x = [0.0; BLOCK];
-        let mut y = [0.0; BLOCK];
-        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
-            let n = out.len();
-            let range = block * BLOCK..block * BLOCK + n;
-            for (to, from) in [(&mut x, at.x), (&mut y, at.y)] {
-                for (to, from) in to.iter_mut().zip(&from[range.clone()]) {
-                    *to = from * self.length;
-                }
-            }
-            let region = at.region.get(range).unwrap_or_default();
-            self.expression.eval(&x[..n], &y[..n], region, out);
-        }
-    }
-
-    /// The value at one of the points, in the user's units: what [`Self::evaluate`] gives there.
+    /// The value at one of the points, in the user's units.
     fn value_at(&self, at: Samples<'_>, k: usize) -> f64 {
         let region = at.region.get(k).copied().unwrap_or_default();
         let [x, y] = [at.x[k], at.y[k]].map(|c| c * self.length);
@@ -89,14 +72,12 @@ impl ExpressionField {
 
 impl Field for ExpressionField {
     fn sample(&self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
-        self.evaluate(at, out);
+        self.scaled_expression.eval(at.x, at.y, at.region, out);
         // Nearly always all are good: one test for all of them.
-        let mut good = true;
-        for value in &mut *out {
-            *value = self.scaled(*value);
-            good &= self.is_good(*value);
-        }
-        if good {
+        if out
+            .iter()
+            .fold(true, |good, value| good & self.is_good(*value))
+        {
             return Ok(());
         }
         match out.iter().position(|value| !self.is_good(*value)) {
