@@ -7,6 +7,9 @@
 
 use crate::function::{Binary, Unary};
 use crate::graph::{Graph, Id, Node};
+use crate::quotient::Divisor;
+use crate::registers::allocate;
+use crate::term::{By, Join, Term};
 
 /// Where an instruction finds a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +26,8 @@ pub(crate) enum Operand {
 pub(crate) enum Op {
     Unary(Unary, u32, Operand),
     Binary(Binary, u32, Operand, Operand),
+    /// A term of a sum, and what it is joined with.
+    Term(u32, Term, Option<(Join, Operand)>),
     /// Target, condition, then, else.
     Select(u32, Operand, Operand, Operand),
     Copy(u32, Operand),
@@ -61,16 +66,23 @@ struct Compiler<'a> {
     placed: Vec<Id>,
     /// For each open branch: the length of `placed` at its start and the target of its choice.
     branches: Vec<(usize, u32)>,
+    /// How many operands each node is.
+    uses: Vec<u32>,
     virtuals: u32,
 }
 
 pub(crate) fn compile(graph: &Graph, root: Id) -> Program {
+    let mut uses = vec![0; graph.nodes().len()];
+    for id in graph.nodes().iter().flat_map(|node| node.operands()) {
+        uses[id.index()] += 1;
+    }
     let mut compiler = Compiler {
         graph,
         ops: Vec::new(),
         places: vec![None; graph.nodes().len()],
         placed: Vec::new(),
         branches: Vec::new(),
+        uses,
         virtuals: 0,
     };
     compiler.run(root);
@@ -125,7 +137,7 @@ impl Compiler<'_> {
         let target = self.new_register();
         let op = match self.graph.node(id) {
             Node::Unary(op, a) => Op::Unary(op, target, self.operand(a)),
-            Node::Binary(op, a, b) => Op::Binary(op, target, self.operand(a), self.operand(b)),
+            Node::Binary(op, a, b) => self.binary(op, target, a, b),
             Node::If(c, a, b) => {
                 Op::Select(target, self.operand(c), self.operand(a), self.operand(b))
             }
@@ -133,6 +145,88 @@ impl Compiler<'_> {
         };
         self.ops.push(op);
         self.set_place(id, target);
+    }
+
+    /// The instruction for an operation. One that comes right before it, for an operand that nothing else needs, is taken into it if both make a term of
+    /// a sum.
+    fn binary(&mut self, op: Binary, target: u32, a: Id, b: Id) -> Op {
+        let divisor = match op {
+            Binary::Div => self.graph.as_number(b).and_then(Divisor::new),
+            _ => None,
+        };
+        let joins = match op {
+            Binary::Add => Some((Join::Plus, Join::Plus)),
+            Binary::Sub => Some((Join::Minus, Join::From)),
+            _ => None,
+        };
+        if let Some(divisor) = divisor {
+            let (factor, of) = match self.take_scaled(a) {
+                Some(scaled) => scaled,
+                None => (1.0, self.operand(a)),
+            };
+            let by = By::Over(divisor);
+            return Op::Term(target, Term { factor, of, by }, None);
+        }
+        if op == Binary::Mul {
+            for (scaled, other) in [(b, a), (a, b)] {
+                if let Some((factor, of)) = self.take_scaled(scaled) {
+                    let by = By::Times(self.operand(other));
+                    return Op::Term(target, Term { factor, of, by }, None);
+                }
+            }
+        }
+        if let Some((left, right)) = joins {
+            for (join, term, other) in [(right, b, a), (left, a, b)] {
+                if let Some(term) = self.take_term(term) {
+                    return Op::Term(target, term, Some((join, self.operand(other))));
+                }
+            }
+        }
+        Op::Binary(op, target, self.operand(a), self.operand(b))
+    }
+
+    /// Takes back the last instruction, if it computes a product with a number that only one operation needs.
+    fn take_scaled(&mut self, id: Id) -> Option<(f64, Operand)> {
+        let scaled = match self.last_for(id)? {
+            Op::Binary(Binary::Mul, _, Operand::Number(factor), of)
+            | Op::Binary(Binary::Mul, _, of, Operand::Number(factor)) => (factor, of),
+            _ => return None,
+        };
+        self.take_back();
+        Some(scaled)
+    }
+
+    /// Takes back the last instruction, if it computes a term that only one operation needs.
+    fn take_term(&mut self, id: Id) -> Option<Term> {
+        let term = match self.last_for(id)? {
+            // A number is not what varies.
+            Op::Binary(Binary::Mul, _, b @ Operand::Number(_), of)
+            | Op::Binary(Binary::Mul, _, of, b) => Term {
+                factor: 1.0,
+                of,
+                by: By::Times(b),
+            },
+            Op::Term(_, term, None) => term,
+            _ => return None,
+        };
+        self.take_back();
+        Some(term)
+    }
+
+    /// The last instruction, if it computes this node and only one operation needs it.
+    fn last_for(&self, id: Id) -> Option<Op> {
+        let last = *self.ops.last()?;
+        let mut copy = last;
+        let target = Operand::Register(*copy.target_mut()?);
+        let own = self.placed.last() == Some(&id) && self.places[id.index()] == Some(target);
+        (own && self.uses[id.index()] == 1).then_some(last)
+    }
+
+    fn take_back(&mut self) {
+        self.ops.pop();
+        if let Some(id) = self.placed.pop() {
+            self.places[id.index()] = None;
+        }
     }
 
     fn split(&mut self, id: Id, tasks: &mut Vec<Task>) {
@@ -176,9 +270,12 @@ impl Compiler<'_> {
         let open = self.ops.len() > start + 1;
         match self.ops.last_mut() {
             // Computed by the last instruction of this branch, so nobody else has it: compute it into the target.
-            Some(Op::Unary(_, last, _) | Op::Binary(_, last, ..) | Op::Select(last, ..))
-                if open && Operand::Register(*last) == source =>
-            {
+            Some(
+                Op::Unary(_, last, _)
+                | Op::Binary(_, last, ..)
+                | Op::Term(last, ..)
+                | Op::Select(last, ..),
+            ) if open && Operand::Register(*last) == source => {
                 *last = target;
             }
             _ => self.ops.push(Op::Copy(target, source)),
@@ -245,78 +342,6 @@ impl Compiler<'_> {
     }
 }
 
-impl Op {
-    fn operands_mut(&mut self) -> impl Iterator<Item = &mut Operand> {
-        let list = match self {
-            Self::Unary(_, _, a) | Self::Copy(_, a) | Self::Split(a, _) => [Some(a), None, None],
-            Self::Binary(_, _, a, b) => [Some(a), Some(b), None],
-            Self::Select(_, c, a, b) => [Some(c), Some(a), Some(b)],
-            Self::Else(_) | Self::Join => [None, None, None],
-        };
-        list.into_iter().flatten()
-    }
-
-    fn target_mut(&mut self) -> Option<&mut u32> {
-        match self {
-            Self::Unary(_, t, _)
-            | Self::Binary(_, t, ..)
-            | Self::Select(t, ..)
-            | Self::Copy(t, _) => Some(t),
-            Self::Split(..) | Self::Else(_) | Self::Join => None,
-        }
-    }
-}
-
-/// Gives each value a register from its first computation to its last use in the list. The order of the list is
-/// enough: a register freed in one branch and used again in the other is written at other points.
-fn allocate(mut ops: Vec<Op>, virtuals: usize, mut result: Operand) -> Program {
-    let mut last_use = vec![0usize; virtuals];
-    for (place, op) in ops.iter_mut().enumerate() {
-        for operand in op.operands_mut() {
-            if let Operand::Register(register) = operand {
-                last_use[*register as usize] = place;
-            }
-        }
-    }
-    if let Operand::Register(register) = result {
-        last_use[register as usize] = ops.len();
-    }
-    let mut given: Vec<Option<u32>> = vec![None; virtuals];
-    let mut free: Vec<u32> = Vec::new();
-    let mut registers = 0u32;
-    for (place, op) in ops.iter_mut().enumerate() {
-        if let Some(target) = op.target_mut() {
-            let register = given[*target as usize].get_or_insert_with(|| {
-                free.pop().unwrap_or_else(|| {
-                    registers += 1;
-                    registers - 1
-                })
-            });
-            *target = *register;
-        }
-        for operand in op.operands_mut() {
-            if let Operand::Register(register) = operand {
-                let value = *register as usize;
-                let place_given = given[value].expect("a value is computed before it is used");
-                if last_use[value] == place {
-                    free.push(place_given);
-                    // Not freed again by a second mention in the same instruction.
-                    last_use[value] = usize::MAX;
-                }
-                *register = place_given;
-            }
-        }
-    }
-    if let Operand::Register(register) = &mut result {
-        *register = given[*register as usize].expect("the result is computed");
-    }
-    Program {
-        ops,
-        registers: registers as usize,
-        result,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -330,7 +355,8 @@ mod tests {
         compile(&graph, root)
     }
 
-    /// The instructions as one letter each: `s`, `c` sine and cosine, `p` a product, `.` others, `(|)` a choice that
+    /// The instructions as one letter each: `s`, `c` sine and cosine, `p` a product, `t` other terms, `+` sums with them, `.`
+    /// others, `(|)` a choice that
     /// splits, `?` one that does not, `=` a copy.
     fn shape(source: &str) -> String {
         let letter = |op: &Op| match op {
@@ -338,6 +364,8 @@ mod tests {
             Op::Unary(Unary::Cos, ..) => 'c',
             Op::Binary(Binary::Mul, ..) => 'p',
             Op::Unary(..) | Op::Binary(..) => '.',
+            Op::Term(_, _, None) => 't',
+            Op::Term(..) => '+',
             Op::Select(..) => '?',
             Op::Copy(..) => '=',
             Op::Split(..) => '(',
@@ -350,7 +378,7 @@ mod tests {
     #[test]
     fn common_subexpressions_are_computed_once() {
         assert_eq!(shape("sin(x*y) + sin(y*x)"), "ps.");
-        assert_eq!(shape("x^2 + x^4 + x^6"), "pp.p.");
+        assert_eq!(shape("x^2 + x^4 + x^6"), "pp.+");
         assert_eq!(shape("x^2 + 1/x^2"), "p..");
     }
 
@@ -373,10 +401,31 @@ mod tests {
 
     #[test]
     fn cheap_choices_are_made_without_a_split() {
-        assert_eq!(shape("if(x^2 + y^2 < 0.5, -10, -8)"), "pp..?");
+        assert_eq!(shape("if(x^2 + y^2 < 0.5, -10, -8)"), "p+.?");
         assert_eq!(shape("if(x > 0 && y > 0, x*y, x - y)"), "..?p.?");
         let nine = "x*y + x - y + 2*x - 3*y + 1/x + x*x";
         assert!(shape(&format!("if(x > 0, {nine}, 0)")).contains('('));
+    }
+
+    #[test]
+    fn terms_are_joined_with_what_they_are_added_to() {
+        assert_eq!(shape("y - 3*x"), "+");
+        assert_eq!(shape("y - 3*x/7 + 5*x*y"), "++");
+        assert_eq!(shape("y + x*y/4 - (5*x)*sin(y)"), "p+ps+");
+        assert_eq!(shape("2*x*y/3"), "tt");
+        // Needed twice, or not last.
+        assert_eq!(shape("x*y + sin(x*y)"), "ps.");
+        assert_eq!(shape("x*y + sin(x)"), "ps.");
+        assert_eq!(shape("x/3/5"), "tt");
+        assert_eq!(shape("if(x > 0, x*y, y/3) + sin(x)"), ".pt?s.");
+        let Op::Term(_, term, Some((Join::From, Operand::Y))) = program("y - 3*x/7").ops[0] else {
+            panic!("a term taken from y");
+        };
+        assert_eq!((term.factor, term.of), (3.0, Operand::X));
+        let Op::Term(_, term, _) = program("2*x + y").ops[0] else {
+            panic!("a term and y");
+        };
+        assert_eq!(term.of, Operand::X);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::compile::{Op, Operand, Program};
 use crate::function::{Binary, Unary};
+use crate::term::{By, TermValues};
 #[cfg(target_arch = "x86_64")]
 use crate::wide::Wide;
 use crate::wide::{Loops, Plain};
@@ -13,10 +14,17 @@ const BLOCK: usize = 256;
 /// Registers that a thread keeps from one call to the next.
 const KEPT_REGISTERS: usize = 512;
 
+/// The values of a block, where no load of four of them crosses a line of the cache.
+#[repr(align(64))]
+struct Register([f64; BLOCK]);
+
 /// Working memory, kept by each thread.
-#[derive(Default)]
 struct Scratch {
-    registers: Vec<Vec<f64>>,
+    #[expect(
+        clippy::vec_box,
+        reason = "registers are swapped, which is not to move their values"
+    )]
+    registers: Vec<Box<Register>>,
     /// The points of the open branches, as a stack of lists.
     points: Vec<u8>,
     splits: Vec<Split>,
@@ -41,7 +49,11 @@ struct Split {
 
 thread_local! {
     static SCRATCH: RefCell<Scratch> = const {
-        RefCell::new(Scratch { registers: Vec::new(), points: Vec::new(), splits: Vec::new() })
+        RefCell::new(Scratch {
+            registers: Vec::new(),
+            points: Vec::new(),
+            splits: Vec::new(),
+        })
     };
 }
 
@@ -52,8 +64,9 @@ pub(crate) fn evaluate(program: &Program, x: &[f64], y: &[f64], region: &[f64], 
         return;
     }
     SCRATCH.with_borrow_mut(|scratch| {
-        while scratch.registers.len() < program.registers {
-            scratch.registers.push(vec![0.0; BLOCK]);
+        // One more than the program has, see `run`.
+        while scratch.registers.len() < program.registers + 1 {
+            scratch.registers.push(Box::new(Register([0.0; BLOCK])));
         }
         #[cfg(target_arch = "x86_64")]
         let wide = Wide::detect();
@@ -87,10 +100,10 @@ struct Inputs<'a> {
 }
 
 impl<'a> Inputs<'a> {
-    fn fetch(self, operand: Operand, registers: &'a [Vec<f64>]) -> Source<'a> {
+    fn fetch(self, operand: Operand, registers: &'a [Box<Register>]) -> Source<'a> {
         match operand {
             Operand::Register(register) => {
-                Source::Each(&registers[register as usize][..self.x.len()])
+                Source::Each(&registers[register as usize].0[..self.x.len()])
             }
             Operand::X => Source::Each(self.x),
             Operand::Y => Source::Each(self.y),
@@ -109,7 +122,7 @@ pub(crate) enum Source<'a> {
 
 impl Source<'_> {
     #[inline(always)]
-    fn at(self, point: usize) -> f64 {
+    pub(crate) fn at(self, point: usize) -> f64 {
         match self {
             Self::Each(values) => values[point],
             Self::Same(value) => value,
@@ -130,6 +143,9 @@ fn run(
         points,
         splits,
     } = scratch;
+    let Some((taken, registers)) = registers.split_last_mut() else {
+        return;
+    };
     points.clear();
     splits.clear();
     let mut active = Active::All;
@@ -140,7 +156,7 @@ fn run(
             Op::Split(condition, middle) => {
                 let condition = inputs.fetch(condition, registers);
                 let mark = points.len();
-                let (then, other) = divide(condition, length, active, points);
+                let (then, other) = divide(condition, length, active, points, loops);
                 splits.push(Split {
                     before: active,
                     other,
@@ -170,12 +186,13 @@ fn run(
             }
             Op::Unary(_, target, _)
             | Op::Binary(_, target, ..)
+            | Op::Term(target, ..)
             | Op::Select(target, ..)
             | Op::Copy(target, _) => target as usize,
         };
-        // The target is none of the operands: taken out, it can be written while they are read.
-        let mut taken = std::mem::take(&mut registers[target]);
-        let into = &mut taken[..length];
+        // The target is none of the operands: swapped for one that nobody reads, it can be written while they are read.
+        std::mem::swap(taken, &mut registers[target]);
+        let into = &mut taken.0[..length];
         let list = match active {
             Active::All => None,
             Active::List(start, end) => Some(&points[start..end]),
@@ -191,6 +208,18 @@ fn run(
                     list,
                 );
             }
+            Op::Term(_, term, sum) => {
+                let values = TermValues {
+                    factor: term.factor,
+                    of: inputs.fetch(term.of, registers),
+                    by: match term.by {
+                        By::Times(b) => By::Times(inputs.fetch(b, registers)),
+                        By::Over(divisor) => By::Over(divisor),
+                    },
+                    sum: sum.map(|(join, c)| (join, inputs.fetch(c, registers))),
+                };
+                loops.term(into, values, list);
+            }
             Op::Select(_, c, a, b) => {
                 let of = [c, a, b].map(|operand| inputs.fetch(operand, registers));
                 loops.select(into, of, list);
@@ -198,7 +227,7 @@ fn run(
             Op::Copy(_, a) => map(into, inputs.fetch(a, registers), list, |a| a),
             Op::Split(..) | Op::Else(_) | Op::Join => {}
         }
-        registers[target] = taken;
+        std::mem::swap(taken, &mut registers[target]);
     }
     match inputs.fetch(program.result, registers) {
         Source::Each(values) => out.copy_from_slice(values),
@@ -217,8 +246,18 @@ fn divide(
     length: usize,
     active: Active,
     points: &mut Vec<u8>,
+    loops: impl Loops,
 ) -> (Active, Active) {
     let mark = points.len();
+    let nobody = Active::List(mark, mark);
+    // Most blocks are on one side.
+    if let (Source::Each(condition), Active::All) = (condition, active) {
+        match loops.count(condition) {
+            0 => return (nobody, active),
+            all if all == length => return (active, nobody),
+            _ => {}
+        }
+    }
     let count = match active {
         Active::All => length,
         Active::List(start, end) => end - start,
@@ -231,15 +270,13 @@ fn divide(
             Active::All => k as u8,
             Active::List(start, _) => points[start + k],
         };
-        if condition.at(point as usize) != 0.0 {
-            points[front] = point;
-            front += 1;
-        } else {
-            back -= 1;
-            points[back] = point;
-        }
+        // Written at both ends, kept at one: there is no telling which, for a processor that would guess.
+        points[front] = point;
+        points[back - 1] = point;
+        let holds = condition.at(point as usize) != 0.0;
+        front += usize::from(holds);
+        back -= usize::from(!holds);
     }
-    let nobody = Active::List(mark, mark);
     if back == mark {
         (nobody, active)
     } else if front == mark + count {
@@ -336,6 +373,16 @@ pub(crate) fn choose(into: &mut [f64], [c, a, b]: [Source; 3], list: Option<&[u8
             }
         }
     }
+}
+
+/// How many of the values are true.
+#[inline(always)]
+pub(crate) fn count(values: &[f64]) -> usize {
+    let mut count = 0u64;
+    for value in values {
+        count += u64::from(*value != 0.0);
+    }
+    count as usize
 }
 
 #[inline(always)]

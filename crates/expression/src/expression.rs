@@ -4,7 +4,8 @@ use crate::compile::{Program, compile};
 use crate::derive;
 use crate::error::ParseError;
 use crate::eval;
-use crate::graph::{Graph, Node, prune};
+use crate::function::Binary;
+use crate::graph::{Graph, Node, prune, renumber};
 use crate::lower::lower;
 use crate::parser;
 use crate::scope::Scope;
@@ -78,6 +79,27 @@ impl Expression {
             nodes,
             program,
         }
+    }
+
+    /// The same formula in other units: of coordinates that are multiplied by `length` before they go into it, with a value that is multiplied by one of the
+    /// `factors` and then by the other.
+    pub fn in_units(&self, length: f64, factors: [f64; 2]) -> Self {
+        let mut graph = Graph::default();
+        let length = graph.number(length);
+        let mut moved = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            let id = graph.add_node(renumber(*node, &moved));
+            moved.push(match node {
+                Node::X | Node::Y => graph.binary(Binary::Mul, id, length),
+                _ => id,
+            });
+        }
+        let mut root = moved.last().copied().unwrap_or(length);
+        for factor in factors {
+            let factor = graph.number(factor);
+            root = graph.binary(Binary::Mul, root, factor);
+        }
+        Self::build(self.source.clone(), prune(graph.nodes(), root))
     }
 
     /// The text it was parsed from; for a derivative `d/dx (text)`, which is not meant to be parsed.

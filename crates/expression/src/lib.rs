@@ -42,8 +42,8 @@
 //!
 //! # Rounding
 //!
-//! Operations are the IEEE ones, in the order written: nothing is reassociated, no quotient becomes a product, no
-//! product and sum are fused. A power with a constant integer exponent up to 1024 in size is made of products only
+//! Operations are the IEEE ones, in the order written: nothing is reassociated, no product and sum are fused, and a
+//! quotient by a constant is made of products only where these have its bits. A power with a constant integer exponent up to 1024 in size is made of products only
 //! (`x^-n` is `1/x^n`). So a formula built of sums, products, quotients and such powers gives results scaled exactly
 //! when its inputs are scaled by powers of two. A batch gives the same bits as its points one by one.
 
@@ -57,7 +57,10 @@ mod graph;
 mod lower;
 mod names;
 mod parser;
+mod quotient;
+mod registers;
 mod scope;
+mod term;
 mod token;
 mod wide;
 

@@ -1,7 +1,9 @@
-//! From what was written to what is executed: integer powers become products, `&&` and `||` become choices.
+//! From what was written to what is executed: integer powers and quotients by powers of two become products, `&&` and
+//! `||` become choices.
 
 use crate::function::{Binary, integer_exponent, integer_power};
 use crate::graph::{Graph, Id, Node, renumber};
+use crate::quotient::exact_reciprocal;
 
 /// The graph to compile, and its root. `nodes` ends with its root.
 pub(crate) fn lower(nodes: &[Node]) -> (Graph, Id) {
@@ -10,6 +12,7 @@ pub(crate) fn lower(nodes: &[Node]) -> (Graph, Id) {
     for node in nodes {
         let id = match renumber(*node, &moved) {
             Node::Binary(Binary::Pow, a, b) => power(&mut graph, a, b),
+            Node::Binary(Binary::Div, a, b) => quotient(&mut graph, a, b),
             Node::Binary(Binary::And, a, b) => {
                 let (then, other) = (graph.truth(b), graph.number(0.0));
                 graph.choose(a, then, other)
@@ -27,6 +30,16 @@ pub(crate) fn lower(nodes: &[Node]) -> (Graph, Id) {
         None => graph.number(0.0),
     };
     (graph, root)
+}
+
+fn quotient(graph: &mut Graph, a: Id, b: Id) -> Id {
+    match graph.as_number(b).and_then(exact_reciprocal) {
+        Some(reciprocal) => {
+            let reciprocal = graph.number(reciprocal);
+            graph.binary(Binary::Mul, a, reciprocal)
+        }
+        None => graph.binary(Binary::Div, a, b),
+    }
 }
 
 fn power(graph: &mut Graph, a: Id, b: Id) -> Id {

@@ -1,9 +1,11 @@
-//! The loops over a block of points, compiled twice: for every processor of the target, and for those with registers of four numbers (AVX2).
+//! The loops over a block of points, compiled twice: for every processor of the target, and for those with registers of four numbers and
+//! with fused operations (AVX2 and FMA).
 //!
-//! Both do the same IEEE operations on every point, and products and sums are never fused, so that they give the same bits.
+//! Both do the same IEEE operations on every point, and products and sums of the formula are never fused, so that they give the same bits.
 
-use crate::eval::{Source, apply_binary, apply_unary, choose};
+use crate::eval::{Source, apply_binary, apply_unary, choose, count};
 use crate::function::{Binary, Unary};
+use crate::term::TermValues;
 
 /// The loops of the instructions; `list` holds the points to work on, all of them if there is none.
 pub(crate) trait Loops: Copy {
@@ -17,6 +19,11 @@ pub(crate) trait Loops: Copy {
         b: Source<'_>,
         list: Option<&[u8]>,
     );
+
+    /// How many of the values are true.
+    fn count(self, values: &[f64]) -> usize;
+
+    fn term(self, into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>);
 
     /// `of` holds the condition and the values where it is true and false.
     fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>);
@@ -42,6 +49,15 @@ impl Loops for Plain {
         apply_binary(op, into, a, b, list);
     }
 
+    fn count(self, values: &[f64]) -> usize {
+        count(values)
+    }
+
+    // Without an instruction for it, a fused operation is slower than a division.
+    fn term(self, into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>) {
+        term.compute(into, list, false);
+    }
+
     fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
         choose(into, of, list);
     }
@@ -53,12 +69,15 @@ pub(crate) use x86::Wide;
 #[cfg(target_arch = "x86_64")]
 #[allow(
     unsafe_code,
-    reason = "functions for AVX2 are called: a `Wide` exists only where the processor was found to have it"
+    reason = "functions for AVX2 and FMA are called: a `Wide` exists only where the processor was found to have it"
 )]
 mod x86 {
-    use super::{Binary, Loops, Source, Unary, apply_binary, apply_unary, choose};
+    use super::{
+        Binary, Loops, Source, TermValues, Unary, apply_binary, apply_unary, choose,
+        count as count_true,
+    };
 
-    /// The proof that the processor has AVX2; made by [`Wide::detect`] alone.
+    /// The proof that the processor has AVX2 and FMA; made by [`Wide::detect`] alone.
     #[derive(Clone, Copy)]
     pub(crate) struct Wide(());
 
@@ -66,13 +85,14 @@ mod x86 {
         /// Asks the processor; the answer is kept by the standard library.
         #[inline]
         pub(crate) fn detect() -> Option<Wide> {
-            is_x86_feature_detected!("avx2").then_some(Wide(()))
+            (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"))
+                .then_some(Wide(()))
         }
     }
 
     impl Loops for Wide {
         fn unary(self, op: Unary, into: &mut [f64], a: Source<'_>, list: Option<&[u8]>) {
-            // SAFETY: the processor has AVX2, or there were no `self`.
+            // SAFETY: the processor has both, or there were no `self`.
             unsafe { unary(op, into, a, list) }
         }
 
@@ -84,27 +104,47 @@ mod x86 {
             b: Source<'_>,
             list: Option<&[u8]>,
         ) {
-            // SAFETY: the processor has AVX2, or there were no `self`.
+            // SAFETY: the processor has both, or there were no `self`.
             unsafe { binary(op, into, a, b, list) }
         }
 
+        fn count(self, values: &[f64]) -> usize {
+            // SAFETY: the processor has both, or there were no `self`.
+            unsafe { count(values) }
+        }
+
+        fn term(self, into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>) {
+            // SAFETY: the processor has both, or there were no `self`.
+            unsafe { compute(into, term, list) }
+        }
+
         fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
-            // SAFETY: the processor has AVX2, or there were no `self`.
+            // SAFETY: the processor has both, or there were no `self`.
             unsafe { select(into, of, list) }
         }
     }
 
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,fma")]
     fn unary(op: Unary, into: &mut [f64], a: Source<'_>, list: Option<&[u8]>) {
         apply_unary(op, into, a, list);
     }
 
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,fma")]
     fn binary(op: Binary, into: &mut [f64], a: Source<'_>, b: Source<'_>, list: Option<&[u8]>) {
         apply_binary(op, into, a, b, list);
     }
 
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,fma")]
+    fn count(values: &[f64]) -> usize {
+        count_true(values)
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    fn compute(into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>) {
+        term.compute(into, list, true);
+    }
+
+    #[target_feature(enable = "avx2,fma")]
     fn select(into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
         choose(into, of, list);
     }
@@ -113,6 +153,8 @@ mod x86 {
 #[cfg(all(test, target_arch = "x86_64"))]
 mod tests {
     use super::*;
+    use crate::quotient::Divisor;
+    use crate::term::{By, Join};
 
     const UNARY: [Unary; 21] = {
         use Unary::*;
@@ -144,6 +186,25 @@ mod tests {
                 }
             })
             .collect()
+    }
+
+    /// A term by the operations that it is made of.
+    fn one_by_one(term: TermValues<'_>, into: &mut [f64], list: Option<&[u8]>) {
+        let [mut scaled, mut product] = [vec![0.0; into.len()], vec![0.0; into.len()]];
+        let factor = Source::Same(term.factor);
+        Plain.binary(Binary::Mul, &mut scaled, factor, term.of, None);
+        let (op, by) = match term.by {
+            By::Times(b) => (Binary::Mul, b),
+            By::Over(divisor) => (Binary::Div, Source::Same(divisor.value)),
+        };
+        Plain.binary(op, &mut product, Source::Each(&scaled), by, None);
+        let t = Source::Each(&product);
+        match term.sum {
+            None => Plain.binary(Binary::Mul, into, t, Source::Same(1.0), list),
+            Some((Join::Plus, c)) => Plain.binary(Binary::Add, into, t, c, list),
+            Some((Join::Minus, c)) => Plain.binary(Binary::Sub, into, t, c, list),
+            Some((Join::From, c)) => Plain.binary(Binary::Sub, into, c, t, list),
+        }
     }
 
     #[test]
@@ -183,6 +244,31 @@ mod tests {
                         &|out| Plain.binary(op, out, p, q, list),
                         &|out| wide.binary(op, out, p, q, list),
                         format!("{op:?}"),
+                    );
+                }
+                let by = [3.0, -0.75, 12.0].map(|value| By::Over(Divisor::new(value).unwrap()));
+                let joins = [Join::Plus, Join::Minus, Join::From].into_iter();
+                let sums = joins.flat_map(|join| sources(&c).map(|c| Some((join, c))));
+                for (by, sum) in by
+                    .into_iter()
+                    .chain([By::Times(q)])
+                    .flat_map(|by| sums.clone().chain([None]).map(move |sum| (by, sum)))
+                {
+                    let term = TermValues {
+                        factor: if sum.is_none() { 1.0 } else { 0.7 },
+                        of: p,
+                        by,
+                        sum,
+                    };
+                    same(
+                        &|out| one_by_one(term, out, list),
+                        &|out| wide.term(out, term, list),
+                        "term".into(),
+                    );
+                    same(
+                        &|out| one_by_one(term, out, list),
+                        &|out| Plain.term(out, term, list),
+                        "term".into(),
                     );
                 }
                 same(

@@ -358,3 +358,20 @@ fn scaling_by_powers_of_two_scales_the_bits() {
         }
     }
 }
+
+#[test]
+fn units_are_products_before_and_after() {
+    let scope = Scope::new();
+    let text = "if(x > 0.3, x^2/3 - y*region, 2 - x)";
+    let plain = Expression::parse(text, &scope).unwrap();
+    let scaled = plain.in_units(0.7, [1.1, 1e-3]);
+    for (x, y) in [(0.5, -2.0), (0.1, 3.0), (-1.0 / 3.0, 0.9)] {
+        assert_eq!(
+            scaled.eval_at(x, y, 5.0),
+            plain.eval_at(x * 0.7, y * 0.7, 5.0) * 1.1 * 1e-3
+        );
+    }
+    assert_eq!(scaled.source(), text);
+    let number = Expression::parse("3", &scope).unwrap();
+    assert_eq!(number.in_units(4.0, [0.5, 0.5]).constant(), Some(0.75));
+}

@@ -4,14 +4,14 @@ use expression::Expression;
 use fem_core::scale::times_power_of_two;
 use fem_core::{Field, FieldError, Samples};
 
-/// Points evaluated at once.
-const BLOCK: usize = 256;
-
 /// An expression of the physical coordinates, read at scaled points.
 #[derive(Clone, Debug)]
 pub(crate) struct ExpressionField {
     name: String,
+    /// As it was written.
     expression: Expression,
+    /// The same for scaled points, with scaled values.
+    scaled_expression: Expression,
     /// 2^a, a the exponent of length.
     length: f64,
     /// Two factors whose product is 2^-e, e the exponent of the values: 2^-e alone may not be a number.
@@ -23,11 +23,14 @@ impl ExpressionField {
     /// The field `expression`, which errors call `name`, with points in units of 2^length and values in units of 2^value.
     pub fn new(name: &str, expression: &Expression, length: i32, value: i32) -> Self {
         let half = -value / 2;
+        let factors = [half, -value - half].map(|e| times_power_of_two(1.0, e));
+        let length = times_power_of_two(1.0, length);
         ExpressionField {
             name: name.to_owned(),
             expression: expression.clone(),
-            length: times_power_of_two(1.0, length),
-            factors: [half, -value - half].map(|e| times_power_of_two(1.0, e)),
+            scaled_expression: expression.in_units(length, factors),
+            length,
+            factors,
             positive: false,
         }
     }
@@ -44,6 +47,19 @@ impl ExpressionField {
         value * self.factors[0] * self.factors[1]
     }
 
+    /// Whether a scaled value may be used. Without a branch, so that many are tested at a time.
+    #[inline]
+    fn is_good(&self, scaled: f64) -> bool {
+        scaled.is_finite() & (!self.positive | (scaled > 0.0))
+    }
+
+    /// The value at one of the points, in the user's units.
+    fn value_at(&self, at: Samples<'_>, k: usize) -> f64 {
+        let region = at.region.get(k).copied().unwrap_or_default();
+        let [x, y] = [at.x[k], at.y[k]].map(|c| c * self.length);
+        self.expression.eval_at(x, y, region)
+    }
+
     fn refuse(&self, value: f64, at: Samples<'_>, k: usize) -> FieldError {
         FieldError {
             name: self.name.clone(),
@@ -56,32 +72,23 @@ impl ExpressionField {
 
 impl Field for ExpressionField {
     fn sample(&self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
-        let mut x = [0.0; BLOCK];
-        let mut y = [0.0; BLOCK];
-        for start in (0..at.len()).step_by(BLOCK) {
-            let end = at.len().min(start + BLOCK);
-            let n = end - start;
-            for k in 0..n {
-                x[k] = at.x[start + k] * self.length;
-                y[k] = at.y[start + k] * self.length;
-            }
-            let region = at.region.get(start..end).unwrap_or_default();
-            let out = &mut out[start..end];
-            self.expression.eval(&x[..n], &y[..n], region, out);
-            for (k, value) in out.iter_mut().enumerate() {
-                let scaled = self.scaled(*value);
-                if !scaled.is_finite() || (self.positive && scaled <= 0.0) {
-                    return Err(self.refuse(*value, at, start + k));
-                }
-                *value = scaled;
-            }
+        self.scaled_expression.eval(at.x, at.y, at.region, out);
+        // Nearly always all are good: one test for all of them.
+        if out
+            .iter()
+            .fold(true, |good, value| good & self.is_good(*value))
+        {
+            return Ok(());
         }
-        Ok(())
+        match out.iter().position(|value| !self.is_good(*value)) {
+            Some(k) => Err(self.refuse(self.value_at(at, k), at, k)),
+            None => Ok(()),
+        }
     }
 
     fn constant(&self) -> Option<f64> {
         let value = self.scaled(self.expression.constant()?);
-        (value.is_finite() && !(self.positive && value <= 0.0)).then_some(value)
+        self.is_good(value).then_some(value)
     }
 }
 

@@ -71,6 +71,27 @@ impl Loads {
         }
     }
 
+    /// [`Loads::new`] for two loads at once: areas and corners are read once, and both sums of a vertex are side by side.
+    pub(super) fn pair(mesh: &Mesh, elements: [Vec<ElementLoad>; 2]) -> [Loads; 2] {
+        let mut nodal = vec![[0.0; 2]; mesh.vertex_count()];
+        let [first, second] = &elements;
+        for ((id, first), second) in mesh.triangle_ids().zip(first).zip(second) {
+            let area = mesh.area(id);
+            let moments = first.moments(area).into_iter().zip(second.moments(area));
+            for (v, (first, second)) in mesh.triangles()[id.index()].iter().zip(moments) {
+                let sums = &mut nodal[v.index()];
+                sums[0] += first;
+                sums[1] += second;
+            }
+        }
+        let [first, second] = elements;
+        [(0, first), (1, second)].map(|(own, elements)| Loads {
+            nodal: nodal.iter().map(|sums| sums[own]).collect(),
+            elements: Elements::Each(elements),
+            reference: None,
+        })
+    }
+
     /// The loads that are `values` everywhere; nothing is stored for the triangles.
     pub fn constant<const N: usize>(mesh: &Mesh, values: [f64; N]) -> [Loads; N] {
         let area = dual_areas(mesh);

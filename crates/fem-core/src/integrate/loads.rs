@@ -258,6 +258,9 @@ impl LoadPair<'_> {
 
     fn finish(self, mesh: &Mesh, constants: [Option<f64>; 2]) -> [Loads; 2] {
         let reference = self.reference;
+        if self.threads <= 1 && constants == [None; 2] {
+            return Loads::pair(mesh, self.elements).map(|loads| loads.relative_to(reference));
+        }
         let [first, second] = self.elements;
         let [f, g] = constants;
         let one = |constant: Option<f64>, elements: Vec<ElementLoad>| {

@@ -17,6 +17,7 @@ use crate::quadrature::{POINTS, RulePoint, rule};
 
 mod carry;
 mod data;
+mod lanes;
 mod loads;
 mod means;
 mod reference;

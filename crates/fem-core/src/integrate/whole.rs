@@ -1,5 +1,6 @@
 //! Sampling whole elements, many at once: what nearly all elements of a fine mesh need.
 
+use super::lanes;
 use super::smooth_error;
 use crate::field::{Field, FieldError, Samples};
 use crate::index::TriangleId;
@@ -7,7 +8,7 @@ use crate::mesh::{Mesh, signed_area};
 use crate::quadrature::{POINTS, rule};
 
 /// Elements that are sampled together: their points fill a block of 256, the best size for expressions.
-const BLOCK: usize = 36;
+pub(super) const BLOCK: usize = 36;
 
 /// Elements that are worked on together: arrays so short stay in registers.
 const LANES: usize = 4;
@@ -27,6 +28,46 @@ pub(super) struct Fit {
     pub error: f64,
 }
 
+/// One number for every element of a block.
+pub(super) type Row = [f64; BLOCK];
+
+/// The fits of one field on the elements of a block.
+#[repr(align(32))]
+#[derive(Clone, Debug)]
+pub(super) struct Fits {
+    mean: Row,
+    corners: [Row; 2],
+    variance: Row,
+    largest: Row,
+    error: Row,
+}
+
+impl Fits {
+    pub(super) const NONE: Fits = Fits {
+        mean: [0.0; BLOCK],
+        corners: [[0.0; BLOCK]; 2],
+        variance: [0.0; BLOCK],
+        largest: [0.0; BLOCK],
+        error: [0.0; BLOCK],
+    };
+
+    #[inline]
+    fn at(&self, k: usize) -> Fit {
+        Fit {
+            mean: self.mean[k],
+            corners: [self.corners[0][k], self.corners[1][k]],
+            variance: self.variance[k],
+            largest: self.largest[k],
+            error: self.error[k],
+        }
+    }
+}
+
+/// The samples of a field at the points of a block.
+#[repr(align(32))]
+#[derive(Clone)]
+pub(super) struct Values(pub(super) [f64; BLOCK * POINTS]);
+
 /// Samples fields on the triangles of `list` and shows every triangle with its area and the fits of the fields.
 ///
 /// # Errors
@@ -39,55 +80,51 @@ pub(super) fn fit<const N: usize>(
 ) -> Result<(), FieldError> {
     let table = Table::new();
     let mut block = Block::new();
-    let mut values = vec![[0.0; BLOCK * POINTS]; N];
+    let mut values = Values([0.0; BLOCK * POINTS]);
+    let mut fits = [const { Fits::NONE }; N];
     let mut list = list.peekable();
     while list.peek().is_some() {
-        block.fill(mesh, &table, list.by_ref().take(BLOCK));
+        block.gather(mesh, list.by_ref().take(BLOCK));
+        lanes::place(&mut block, &table);
         let stride = block.stride();
-        let samples = block.samples();
-        for (field, values) in fields.iter().zip(&mut values) {
-            field.sample(samples, &mut values[..stride * POINTS])?;
+        for (field, fits) in fields.iter().zip(&mut fits) {
+            field.sample(block.samples(), &mut values.0[..stride * POINTS])?;
+            lanes::fit(&table, &values, stride, fits);
         }
-        for first in (0..block.count).step_by(LANES) {
-            let mut fits = [[Fit::default(); LANES]; N];
-            for (fits, values) in fits.iter_mut().zip(&values) {
-                *fits = table.fit(|q| {
-                    let at = q * stride + first;
-                    std::array::from_fn(|lane| values[at + lane])
-                });
-            }
-            for lane in 0..LANES.min(block.count - first) {
-                let t = block.triangles[first + lane] as usize;
-                visit(
-                    t,
-                    block.area[first + lane],
-                    fits.each_ref().map(|f| f[lane]),
-                );
-            }
+        for k in 0..block.count {
+            let t = block.triangles[k] as usize;
+            visit(t, block.area[k], fits.each_ref().map(|f| f.at(k)));
         }
     }
     Ok(())
 }
 
 /// The points of a block of elements: point q of all elements, then point q + 1.
-struct Block {
-    triangles: [u32; BLOCK],
-    count: usize,
-    area: [f64; BLOCK],
+#[repr(align(32))]
+pub(super) struct Block {
+    /// Coordinates of the corners, `corners[corner][axis]`.
+    corners: [[Row; 2]; 3],
+    area: Row,
     x: [f64; BLOCK * POINTS],
     y: [f64; BLOCK * POINTS],
     region: [f64; BLOCK * POINTS],
+    triangles: [u32; BLOCK],
+    count: usize,
+    /// What all of `region` was filled with last, if it was the same.
+    same_region: Option<i32>,
 }
 
 impl Block {
     fn new() -> Block {
         Block {
-            triangles: [0; BLOCK],
-            count: 0,
+            corners: [[[0.0; BLOCK]; 2]; 3],
             area: [0.0; BLOCK],
             x: [0.0; BLOCK * POINTS],
             y: [0.0; BLOCK * POINTS],
             region: [0.0; BLOCK * POINTS],
+            triangles: [0; BLOCK],
+            count: 0,
+            same_region: Some(0),
         }
     }
 
@@ -105,19 +142,15 @@ impl Block {
         }
     }
 
-    /// Takes at most [`BLOCK`] triangles and at least one.
-    fn fill(&mut self, mesh: &Mesh, table: &Table, list: impl Iterator<Item = u32>) {
+    /// Takes at most [`BLOCK`] triangles and at least one, with their corners and regions.
+    fn gather(&mut self, mesh: &Mesh, list: impl Iterator<Item = u32>) {
         self.count = 0;
-        let mut corners = [[[0.0; BLOCK]; 2]; 3];
-        let mut region = [0.0; BLOCK];
         let mut put = |k: usize, t: u32| {
             let c = mesh.corners(TriangleId(t));
-            for (to, from) in corners.iter_mut().zip(c) {
+            for (to, from) in self.corners.iter_mut().zip(c) {
                 to[0][k] = from[0];
                 to[1][k] = from[1];
             }
-            region[k] = f64::from(mesh.region()[t as usize]);
-            self.area[k] = signed_area(c);
             self.triangles[k] = t;
         };
         let mut last = 0;
@@ -131,21 +164,47 @@ impl Block {
             put(k, last);
         }
         let stride = self.stride();
+        let region = |k: usize| mesh.region()[self.triangles[k] as usize];
+        let first = region(0);
+        let same = (1..stride).all(|k| region(k) == first).then_some(first);
+        if same.is_some() && same == self.same_region {
+            return;
+        }
+        match same {
+            Some(first) => self.region.fill(f64::from(first)),
+            None => {
+                for q in 0..POINTS {
+                    for k in 0..stride {
+                        self.region[q * stride + k] = f64::from(region(k));
+                    }
+                }
+            }
+        }
+        self.same_region = same;
+    }
+
+    /// Finds the points and the areas.
+    #[inline(always)]
+    pub(super) fn place(&mut self, table: &Table) {
+        let stride = self.stride();
+        let axes = [0, 1].map(|axis| self.corners.each_ref().map(|c| &c[axis][..stride]));
+        let [[ax, bx, cx], [ay, by, cy]] = axes;
+        for (k, area) in self.area[..stride].iter_mut().enumerate() {
+            *area = signed_area([[ax[k], ay[k]], [bx[k], by[k]], [cx[k], cy[k]]]);
+        }
         for (q, at) in table.at.iter().enumerate() {
             let range = q * stride..(q + 1) * stride;
-            for (axis, to) in [(0, &mut self.x), (1, &mut self.y)] {
-                let [a, b, c] = corners.each_ref().map(|corner| &corner[axis][..stride]);
+            for ([a, b, c], to) in axes.into_iter().zip([&mut self.x, &mut self.y]) {
                 for (k, to) in to[range.clone()].iter_mut().enumerate() {
                     *to = at[0] * a[k] + at[1] * b[k] + at[2] * c[k];
                 }
             }
-            self.region[range].copy_from_slice(&region[..stride]);
         }
     }
 }
 
 /// The rule, as the fits need it.
-struct Table {
+pub(super) struct Table {
     at: [[f64; 3]; POINTS],
     weight: [f64; POINTS],
     /// Weight times (lambda_k - 1/3) for the corners 0 and 1; the three sum to zero.
@@ -162,10 +221,21 @@ impl Table {
         }
     }
 
-    /// Fits affine functions to the samples of some elements, see [`crate::quadrature::affine_fit`].
+    /// Fits affine functions to the samples of the elements of a block, see [`crate::quadrature::affine_fit`].
     #[inline(always)]
-    fn fit(&self, sample: impl Fn(usize) -> [f64; LANES]) -> [Fit; LANES] {
+    pub(super) fn fit(&self, values: &Values, stride: usize, fits: &mut Fits) {
+        for first in (0..stride).step_by(LANES) {
+            self.fit_lanes(values, stride, first, fits);
+        }
+    }
+
+    #[inline(always)]
+    fn fit_lanes(&self, values: &Values, stride: usize, begin: usize, fits: &mut Fits) {
         type Lanes = [f64; LANES];
+        let sample = |q: usize| -> Lanes {
+            let at = &values.0[q * stride + begin..][..LANES];
+            std::array::from_fn(|l| at[l])
+        };
         let base = sample(0);
         let mut largest: Lanes = base.map(f64::abs);
         let (mut mean, mut square): (Lanes, Lanes) = ([0.0; LANES], [0.0; LANES]);
@@ -194,15 +264,67 @@ impl Table {
                 misfit[l] = if off > misfit[l] { off } else { misfit[l] };
             }
         }
-        std::array::from_fn(|l| {
-            let third = (base[l] + mean[l]) / 3.0;
-            Fit {
-                mean: base[l] + mean[l],
-                corners: [third + first[l], third + second[l]],
-                variance: (square[l] - mean[l] * mean[l]).max(0.0),
-                largest: largest[l],
-                error: smooth_error(misfit[l], largest[l]),
-            }
+        let put = |to: &mut Row, value: Lanes| to[begin..][..LANES].copy_from_slice(&value);
+        let lanes = |f: &dyn Fn(usize) -> f64| -> Lanes { std::array::from_fn(f) };
+        put(&mut fits.mean, lanes(&|l| base[l] + mean[l]));
+        for (to, slope) in fits.corners.iter_mut().zip([first, second]) {
+            put(to, lanes(&|l| (base[l] + mean[l]) / 3.0 + slope[l]));
+        }
+        put(
+            &mut fits.variance,
+            lanes(&|l| (square[l] - mean[l] * mean[l]).max(0.0)),
+        );
+        put(&mut fits.largest, largest);
+        put(
+            &mut fits.error,
+            lanes(&|l| smooth_error(misfit[l], largest[l])),
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers from -1 to 1.
+    fn numbers(seed: u64) -> impl Iterator<Item = f64> {
+        let mut state = seed;
+        std::iter::repeat_with(move || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
         })
+    }
+
+    #[test]
+    fn wide_loops_give_the_bits_of_plain_ones() {
+        let table = Table::new();
+        for count in [1, 4, 21, BLOCK] {
+            let block = || {
+                let mut block = Block::new();
+                block.count = count;
+                let rows = block.corners.iter_mut().flatten();
+                for (k, row) in rows.enumerate() {
+                    row.iter_mut()
+                        .zip(numbers(k as u64))
+                        .for_each(|(to, from)| *to = from);
+                }
+                block
+            };
+            let (mut plain, mut wide) = (block(), block());
+            plain.place(&table);
+            lanes::place(&mut wide, &table);
+            assert_eq!((plain.x, plain.y, plain.area), (wide.x, wide.y, wide.area));
+            let mut values = Values([0.0; BLOCK * POINTS]);
+            for (k, (to, from)) in values.0.iter_mut().zip(numbers(7)).enumerate() {
+                // The first elements have the same value at all points.
+                *to = if k % block().stride() < 2 { 0.3 } else { from };
+            }
+            let (mut plain, mut wide) = (Fits::NONE, Fits::NONE);
+            table.fit(&values, block().stride(), &mut plain);
+            lanes::fit(&table, &values, block().stride(), &mut wide);
+            assert_eq!(format!("{plain:?}"), format!("{wide:?}"));
+        }
     }
 }
