@@ -193,11 +193,12 @@ impl Counts {
     pub fn row(&self, case: &Case) -> String {
         let nested = &self.nested;
         let settled = self.settled.map_or("-".to_owned(), |n| n.to_string());
-        let cold = self.cold.map_or("active set".to_owned(), |c| {
-            format!("{} + {}, {}", c.inequality, c.monotone, c.mean)
+        let cold = self.cold.map_or("active set | -".to_owned(), |c| {
+            let (gap, quotient) = (c.inequality, self.cold_over_nested());
+            format!("{gap} + {}, {} | {quotient:.2}", c.monotone, c.mean)
         });
         format!(
-            "| {} | {} | {} | {}, {} | {}, {} | {:.3} | {cold} | {:.2} | {:.4} | {settled} | {} |",
+            "| {} | {} | {} | {}, {} | {}, {} | {:.3} | {cold} | {:.4} | {settled} | {} |",
             case.name,
             self.vertices,
             self.depth,
@@ -206,7 +207,6 @@ impl Counts {
             self.enough,
             case.group.most(),
             self.contraction,
-            self.cold_over_nested(),
             self.one,
             self.run
         )
