@@ -1,7 +1,7 @@
 //! What a whole adaptive run costs a vertex, while the number of vertices grows.
 //!
 //! `cargo bench -p membranes --bench growth` runs the scenes in `benches/growth/` to 10^4 vertices, then to twice as many, and so on up to 10^6:
-//! residual estimator, no known solution, no files, one thread, from the scene file to the solution in memory. `-- --to 1e7` goes further,
+//! residual estimator, no known solution, no files, one thread, from the scene file to the solution in memory. `-- --to 1e7` goes further, `--only two_fields` takes one scene,
 //! `--repeat 3` takes the least times of three, `--threads 2` compares two threads with one on the largest size, `--plot` draws
 //! `docs/pictures/growth.svg` with Python. Tables are printed as the documentation quotes them.
 //!
@@ -39,9 +39,10 @@ fn best(repeat: usize, mut work: impl FnMut() -> f64) -> f64 {
 }
 
 /// Name of the scene's file and what a table calls it.
-const SCENES: [(&str, &str); 2] = [
+const SCENES: [(&str, &str); 3] = [
     ("constant", "L-shape, constant loads"),
     ("square", "square, loads are formulas"),
+    ("two_fields", "square, two fields, tensions are formulas"),
 ];
 
 /// The first limit on vertices.
@@ -329,7 +330,13 @@ fn main() -> ExitCode {
     println!("one thread; other programs on the machine disturb\n");
     let before = limits::print();
     let mut measured = Vec::new();
-    for (scene, title) in SCENES {
+    let only = arguments.iter().position(|a| a == "--only");
+    let only = only.and_then(|at| arguments.get(at + 1));
+    let scenes: Vec<_> = SCENES
+        .into_iter()
+        .filter(|(scene, _)| only.is_none_or(|name| name == scene))
+        .collect();
+    for &(scene, title) in &scenes {
         let mut sizes = Vec::new();
         for limit in limits_to(largest) {
             let times = if limit <= TWICE { 2 } else { 1 };
@@ -358,7 +365,7 @@ fn main() -> ExitCode {
     }
     if let Some(threads) = value("--threads") {
         println!("\n| scene | vertices | threads | wall s | times faster |\n|---|---|---|---|---|");
-        for (scene, _) in SCENES {
+        for &(scene, _) in &scenes {
             compare_threads(scene, largest, threads, repeat);
         }
         println!("\nThe last record and the displacements have the same bits for all of them.");
