@@ -266,6 +266,7 @@ fn certificate(
         load: [&*problem.load[0], &*problem.load[1]],
         tension: [&*problem.tension[0], &*problem.tension[1]],
         moments,
+        loads: &discrete.loads,
         tension_mean: &discrete.tension_mean,
         displacement: &solution.displacement,
         force: &solution.force,

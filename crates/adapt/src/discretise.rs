@@ -118,6 +118,21 @@ pub(crate) fn moments_near(
     )?)
 }
 
+/// Adds the samples that these forces make matter, or all there are.
+///
+/// # Errors
+/// A value of a load that is not finite.
+pub(crate) fn cover(
+    moments: &mut Moments,
+    problem: &Problem,
+    mesh: &Mesh,
+    force: Option<&[f64]>,
+) -> Result<(), FieldError> {
+    let load = [&*problem.load[0], &*problem.load[1]];
+    let tension = [&*problem.tension[0], &*problem.tension[1]];
+    moments.cover(mesh, load, tension, force)
+}
+
 /// The data of a problem and what its elements are judged by.
 struct Fields<'a> {
     reference: Reference,

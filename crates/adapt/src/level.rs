@@ -7,7 +7,7 @@ use contact::{DiscreteProblem, Solution, Start, Tolerance, Workspace};
 use estimate::{Grade, Moments};
 use fem_core::{Mesh, TriangleId, parallel};
 
-use crate::discretise::{Before, DataError, discretise, discretise_carried, moments_near};
+use crate::discretise::{Before, DataError, cover, discretise, discretise_carried, moments_near};
 use crate::estimates::{self, Estimates};
 use crate::output::memory::peak_memory_mb;
 use crate::problem::Problem;
@@ -359,9 +359,12 @@ impl Level {
             }
             self.solve_on(context, AHEAD * algebraic * share / found, workspace)?;
             estimated = false;
-            let load = [&*problem.load[0], &*problem.load[1]];
-            let tension = [&*problem.tension[0], &*problem.tension[1]];
-            moments.cover(&self.mesh, load, tension, &self.solution.force)?;
+            cover(
+                &mut moments,
+                problem,
+                &self.mesh,
+                Some(&self.solution.force),
+            )?;
         }
         self.moments = Some(moments);
         if estimated {
@@ -393,6 +396,11 @@ impl Level {
     ///
     /// Returns the quotient of the sharp bound and the one before; 1 where both vanish.
     pub(crate) fn sharpen(&mut self, context: Context<'_>) -> Result<f64, LevelError> {
+        if let Some(moments) = &mut self.moments {
+            let clock = Instant::now();
+            cover(moments, context.problem, &self.mesh, None)?;
+            self.record.seconds_assemble += clock.elapsed().as_secs_f64();
+        }
         let ratio = self.add_certificate(Grade::Rt1, context)?;
         self.stamp(context);
         Ok(ratio)

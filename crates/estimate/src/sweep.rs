@@ -5,17 +5,20 @@
 //! [threads](fem_core::parallel) share; a jump over an edge is added when the later one of its triangles is met, which has the normal at hand and finds the flux
 //! of the other one stored. The few edges between two blocks are handled on both sides.
 
+mod data;
+
 use std::ops::Range;
 
 use contact::{DiscreteProblem, Solution};
+use fem_core::Mesh;
 use fem_core::integrate::Loads;
 use fem_core::parallel::{self, BLOCK};
-use fem_core::{ElementValues, Mesh};
 
 use crate::action::nodal_action;
 use crate::energy::Energy;
 use crate::residual::contact_term;
 use crate::squares::Squares;
+use data::{Constants, Data, Even, Loaded};
 
 /// What one pass tells of a level; scaled.
 #[derive(Clone, Debug)]
@@ -40,127 +43,6 @@ struct Corner {
     point: [f64; 2],
     displacement: [f64; 2],
     action: f64,
-}
-
-/// The data of the elements, as the pass reads them; those of both membranes at once.
-trait Data {
-    /// Whether the loads deviate from their means.
-    const VARYING: bool;
-
-    /// mu_iK.
-    fn tensions(&self, t: usize) -> [f64; 2];
-
-    /// 1/mu_iK.
-    fn softness(&self, t: usize) -> [f64; 2];
-
-    /// 1/max(mu_iK, mu_iK') for two neighbours.
-    fn stiffer(&self, t: usize, s: usize) -> [f64; 2];
-
-    /// f_ih.
-    fn means(&self, t: usize) -> [f64; 2];
-}
-
-/// Tensions that are the same everywhere.
-struct Even {
-    tension: [f64; 2],
-    softness: [f64; 2],
-}
-
-impl Even {
-    fn of(problem: &DiscreteProblem) -> Option<Even> {
-        let [Some(m1), Some(m2)] = problem.tension_mean.each_ref().map(ElementValues::same) else {
-            return None;
-        };
-        Some(Even {
-            tension: [m1, m2],
-            softness: [1.0 / m1, 1.0 / m2],
-        })
-    }
-}
-
-/// Loads too that are the same everywhere.
-struct Constants {
-    even: Even,
-    load: [f64; 2],
-}
-
-impl Data for Constants {
-    const VARYING: bool = false;
-
-    #[inline(always)]
-    fn tensions(&self, _: usize) -> [f64; 2] {
-        self.even.tension
-    }
-
-    #[inline(always)]
-    fn softness(&self, _: usize) -> [f64; 2] {
-        self.even.softness
-    }
-
-    #[inline(always)]
-    fn stiffer(&self, _: usize, _: usize) -> [f64; 2] {
-        self.even.softness
-    }
-
-    #[inline(always)]
-    fn means(&self, _: usize) -> [f64; 2] {
-        self.load
-    }
-}
-
-/// Constant tensions and any loads.
-struct Loaded<'a> {
-    even: Even,
-    loads: &'a [Loads; 2],
-}
-
-impl Data for Loaded<'_> {
-    const VARYING: bool = true;
-
-    #[inline(always)]
-    fn tensions(&self, _: usize) -> [f64; 2] {
-        self.even.tension
-    }
-
-    #[inline(always)]
-    fn softness(&self, _: usize) -> [f64; 2] {
-        self.even.softness
-    }
-
-    #[inline(always)]
-    fn stiffer(&self, _: usize, _: usize) -> [f64; 2] {
-        self.even.softness
-    }
-
-    #[inline(always)]
-    fn means(&self, t: usize) -> [f64; 2] {
-        self.loads.each_ref().map(|f| f.mean(t))
-    }
-}
-
-impl Data for &DiscreteProblem {
-    const VARYING: bool = true;
-
-    #[inline(always)]
-    fn tensions(&self, t: usize) -> [f64; 2] {
-        self.tension_mean.each_ref().map(|mean| mean[t])
-    }
-
-    #[inline(always)]
-    fn softness(&self, t: usize) -> [f64; 2] {
-        self.tensions(t).map(|mu| 1.0 / mu)
-    }
-
-    #[inline(always)]
-    fn stiffer(&self, t: usize, s: usize) -> [f64; 2] {
-        let (here, there) = (self.tensions(t), self.tensions(s));
-        [0, 1].map(|i| 1.0 / here[i].max(there[i]))
-    }
-
-    #[inline(always)]
-    fn means(&self, t: usize) -> [f64; 2] {
-        self.loads.each_ref().map(|f| f.mean(t))
-    }
 }
 
 /// Passes over all triangles on at most `threads` threads, whose number does not show; the residual estimator is computed if it is wanted.
@@ -447,7 +329,7 @@ mod tests {
     use super::*;
     use crate::testing::{close, deviating, four_triangles, problem, solution};
     use crate::{energy, oscillation, residual};
-    use fem_core::{Children, TriangleId};
+    use fem_core::{Children, ElementValues, TriangleId};
 
     #[test]
     fn a_sweep_says_what_every_estimator_says_by_itself() {

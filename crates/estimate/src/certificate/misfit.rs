@@ -129,7 +129,7 @@ const CONTROL: Control = Control {
 const LOCAL_TOLERANCE: f64 = 1e-3;
 
 /// An element's load is smooth if it differs from its best affine fit by at most this part of what the divergence leaves of the fit.
-const SMOOTH: f64 = 0.1;
+const SMOOTH: f64 = 0.01;
 
 /// Evaluates the norms where data vary: in closed form where the data are constant in an element, by a bound as good where the load is smooth and the
 /// membranes are apart, else by quadrature.

@@ -110,7 +110,7 @@ fn bound(eta: f64, contact: f64) -> f64 {
 /// # Errors
 /// A value of a load or a tension that is not finite.
 pub fn certify(given: &Given<'_>, grade: Grade, poincare: f64) -> Result<Certificate, FieldError> {
-    let covered = covered(given)?;
+    let covered = covered(given, grade)?;
     let given = &covered
         .as_ref()
         .map_or(*given, |moments| Given { moments, ..*given });
@@ -132,7 +132,7 @@ pub fn certify(given: &Given<'_>, grade: Grade, poincare: f64) -> Result<Certifi
 /// # Errors
 /// A value of a load that is not finite.
 pub fn algebraic(given: &Given<'_>) -> Result<f64, FieldError> {
-    let covered = covered(given)?;
+    let covered = covered(given, Grade::Rt0)?;
     let given = &covered
         .as_ref()
         .map_or(*given, |moments| Given { moments, ..*given });
@@ -140,13 +140,14 @@ pub fn algebraic(given: &Given<'_>) -> Result<f64, FieldError> {
     Ok(Shares::of(given).0.algebraic(given.mesh, low))
 }
 
-/// The moments with what the forces want and they lack, if they lack anything.
-fn covered(given: &Given<'_>) -> Result<Option<Moments>, FieldError> {
-    if given.moments.missing(given.mesh, given.force).is_empty() {
+/// The moments with what a grade wants and they lack, if they lack anything.
+fn covered(given: &Given<'_>, grade: Grade) -> Result<Option<Moments>, FieldError> {
+    let force = (grade == Grade::Rt0).then_some(given.force);
+    if given.moments.missing(given.mesh, force).is_empty() {
         return Ok(None);
     }
     let mut moments = given.moments.clone();
-    moments.cover(given.mesh, given.load, given.tension, given.force)?;
+    moments.cover(given.mesh, given.load, given.tension, force)?;
     Ok(Some(moments))
 }
 

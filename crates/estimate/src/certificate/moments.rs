@@ -19,24 +19,6 @@ fn product(k: usize, l: usize) -> usize {
     if k == l { k } else { 6 - k - l }
 }
 
-/// (p, phi_k phi_m) for m = 0, 1, 2 and the affine function p that has the given moments (p, phi_l).
-///
-/// For any function with these moments the sum over k is the same: its moments themselves.
-fn affine_products(moments: [f64; 3], k: usize) -> [f64; 3] {
-    let sum = moments[0] + moments[1] + moments[2];
-    // The values at the corners times the area, by the inverse of the mass matrix.
-    let corner = moments.map(|m| 12.0 * m - 3.0 * sum);
-    [0, 1, 2].map(|m| {
-        if m == k {
-            // 1/10 of the own corner, 1/30 of the others.
-            (corner[k] * 2.0 + corner[0] + corner[1] + corner[2]) / 30.0
-        } else {
-            // 1/30 of both corners, 1/60 of the third.
-            (corner[0] + corner[1] + corner[2] + corner[k] + corner[m]) / 60.0
-        }
-    })
-}
-
 /// Where the moments of an element are among those that are kept.
 #[derive(Clone, Debug)]
 enum Products3 {
@@ -164,12 +146,13 @@ impl Moments {
         if moments.complete {
             moments.sample(mesh, load, tension, |_| true)?;
         } else {
-            moments.cover(mesh, load, tension, force)?;
+            moments.cover(mesh, load, tension, Some(force))?;
         }
         Ok(moments)
     }
 
-    /// Integrates over the elements that these action forces make matter and that were not sampled yet.
+    /// Integrates over the elements that these action forces make matter and that were not sampled yet, which is what [`super::Grade::Rt0`] needs; without
+    /// forces over all, for [`super::Grade::Rt1`].
     ///
     /// # Errors
     /// A value of a load that is not finite.
@@ -178,7 +161,7 @@ impl Moments {
         mesh: &Mesh,
         load: [&dyn Field; 2],
         tension: [&dyn Field; 2],
-        force: &[f64],
+        force: Option<&[f64]>,
     ) -> Result<(), FieldError> {
         let missing = self.missing(mesh, force);
         if missing.is_empty() {
@@ -188,11 +171,13 @@ impl Moments {
         for &t in &missing {
             new[t] = true;
         }
+        self.complete |= force.is_none();
         self.sample(mesh, load, tension, |t| new[t])
     }
 
-    /// The elements that touch a vertex with a force, or one on the boundary that such a vertex may lend its share to, and were not sampled.
-    pub(super) fn missing(&self, mesh: &Mesh, force: &[f64]) -> Vec<usize> {
+    /// The elements that were not sampled and touch a vertex with a force, or one on the boundary that such a vertex may lend its share to; without forces
+    /// all that were not sampled.
+    pub(super) fn missing(&self, mesh: &Mesh, force: Option<&[f64]>) -> Vec<usize> {
         let Products3::Each(place, _) = &self.products else {
             return Vec::new();
         };
@@ -200,13 +185,13 @@ impl Moments {
             return Vec::new();
         }
         let boundary = mesh.boundary();
-        let pressed = |j: usize| !boundary[j] && force[j] > 0.0;
+        let pressed = |j: usize| !boundary[j] && force.is_none_or(|force| force[j] > 0.0);
         // Shares go along the boundary as far as there are gaps to close: all of it may be reached.
         let any = mesh.triangles().iter().any(|v| {
             let v = v.map(|j| j.index());
             v.iter().any(|&j| pressed(j)) && v.iter().any(|&j| boundary[j])
         });
-        let matters = |j: usize| pressed(j) || (any && boundary[j]);
+        let matters = |j: usize| pressed(j) || ((any || force.is_none()) && boundary[j]);
         let triangles = mesh.triangles().iter().enumerate();
         triangles
             .filter(|(t, v)| place[*t] == NOWHERE && v.iter().any(|j| matters(j.index())))
@@ -322,22 +307,19 @@ impl Moments {
         }
     }
 
-    /// (f_i, phi_k phi_m) over an element for m = 0, 1, 2: from samples where lambda* `acts`, since it must cancel there; else of the affine function that
-    /// has the same moments `hats` as f_i.
-    pub(super) fn load_products(
+    /// (f_i, phi_k phi_l) over a sampled element; from `mean` where all data are constants.
+    #[inline]
+    pub fn load_product(
         &self,
         i: usize,
         t: usize,
-        k: usize,
-        hats: [f64; 3],
-        acts: bool,
-    ) -> [f64; 3] {
+        area: f64,
+        mean: f64,
+        (k, l): (usize, usize),
+    ) -> f64 {
         match &self.products {
-            Products3::Each(place, products) if acts => {
-                let products = products.get(place[t] as usize);
-                products.map_or([0.0; 3], |p| [0, 1, 2].map(|m| p[i][product(k, m)]))
-            }
-            _ => affine_products(hats, k),
+            Products3::Constant(_) => mean * area / if k == l { 6.0 } else { 12.0 },
+            Products3::Each(..) => self.product(i, t, area, k, l),
         }
     }
 

@@ -268,17 +268,13 @@ impl Link {
         // (chi_Dj, phi) for the vertex itself and the two other corners.
         let cell = [11.0 * area / 54.0, 7.0 * area / 108.0, 7.0 * area / 108.0];
         let theta = shares.theta[j];
-        let acts = mesh.triangles()[t]
-            .iter()
-            .any(|j| shares.theta[j.index()] != 0.0);
         let moments = [0, 1].map(|i| {
             let own = shares.cell(i, j);
-            let hats = given.loads[i].moments(t, area);
-            let load = given.moments.load_products(i, t, k, hats, acts);
+            let mean = given.loads[i].mean(t);
             let mut result = [0.0; 3];
             for l in 0..3 {
                 let m = (k + l) % 3;
-                result[l] = load[m]
+                result[l] = given.moments.load_product(i, t, area, mean, (k, m))
                     + SIGN[i] * theta * given.moments.action_product(t, area, k, m)
                     + own * cell[l];
             }
