@@ -11,6 +11,7 @@ import sys
 CURVES = [
     ("constant", "L-shape, constant loads", "#1f77b4"),
     ("square", "square, loads are formulas", "#c0392b"),
+    ("two_fields", "two fields, formulas", "#2e8b57"),
 ]
 WIDTH, HEIGHT, LEFT, TOP, RIGHT, BOTTOM = 560, 300, 62, 20, 62, 66
 
