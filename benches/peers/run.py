@@ -95,6 +95,24 @@ def measure(command, log=None):
     return output, {"cpu": usage.ru_utime + usage.ru_stime, "wall": wall, "peak_mb": usage.ru_maxrss / 1024}
 
 
+# A program runs this often in a round at most, and no more once so many seconds are spent: what else the machine does can double a
+# run of a second, and hardly touches one of half a minute.
+ATTEMPTS, ENOUGH = 5, 10.0
+
+
+def fastest(run):
+    """The run of least CPU seconds among those of a round."""
+    best, spent = None, 0.0
+    for _ in range(ATTEMPTS):
+        result = run()
+        spent += result["wall"]
+        if best is None or result["cpu"] < best["cpu"]:
+            best = result
+        if spent >= ENOUGH:
+            break
+    return best
+
+
 def run_peer(peer, target):
     """One run: the levels it printed, and the whole process without what the true errors cost."""
     output, whole = measure([*peer["command"], peer["dash"] + "target", str(target)], SCRATCH / "errors.log")
@@ -276,13 +294,13 @@ def main():
     absent = [p for p in wanted if p not in here]
     best, before = {}, None
     for round_ in range(options.repeat):
-        _, coarser = ours.run(ours.scene, levels[-2]["vertices"])
+        coarser = fastest(lambda: ours.run(ours.scene, levels[-2]["vertices"])[1])
         before = min(before or coarser["cpu"], coarser["cpu"])
         runs = [("membranes", lambda: ours.run(ours.scene, levels[-1]["vertices"])[1] | {"levels": levels})]
         runs += [(" ".join(p["command"][-3:]), lambda p=p: run_peer(p, options.target)) for p in here]
         for index, (name, run) in enumerate(runs):
             try:
-                result = run()
+                result = fastest(run)
             except RuntimeError as error:  # too little memory, say: the others go on
                 print(f"round {round_ + 1}: {error}", flush=True)
                 continue
