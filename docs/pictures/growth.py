@@ -1,6 +1,6 @@
 """Draws growth.svg beside this file from the lines `csv,...` that the bench of the whole run hands over:
 
-    cargo bench -p membranes --bench growth -- --to 1e7 --repeat 3 --plot
+    cargo bench -p membranes --bench growth -- --to 1e7 --repeat 2 --only constant/square --plot
 """
 
 import math
@@ -37,7 +37,8 @@ def step(top):
 
 def main():
     curves = read(sys.stdin)
-    rows = [row for name, *_ in CURVES for row in curves[name]]
+    drawn = [curve for curve in CURVES if curve[0] in curves]
+    rows = [row for name, *_ in drawn for row in curves[name]]
     start = 10 ** math.floor(math.log10(min(r["vertices"] for r in rows)))
     end = 2 * max(r["vertices"] for r in rows)
     top = 1.1 * max(r["microseconds"] for r in rows)
@@ -75,7 +76,7 @@ def main():
     out.append(f'<rect x="{LEFT}" y="{TOP}" width="{WIDTH}" height="{HEIGHT}" fill="none" stroke="#444"/>')
     out.append(f'<text x="{LEFT + WIDTH / 2}" y="{TOP + HEIGHT + 34}" text-anchor="middle">vertices of the last mesh</text>')
     at = LEFT
-    for name, label, colour in CURVES:
+    for name, label, colour in drawn:
         points = [(x(r["vertices"]), y(r["microseconds"])) for r in curves[name]]
         path = "L".join(f"{a:.1f} {b:.1f}" for a, b in points)
         out.append(f'<path d="M{path}" fill="none" stroke="{colour}" stroke-width="2"/>')
