@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p membranes --bench growth` runs the scenes in `benches/growth/` to 10^4 vertices, then to twice as many, and so on up to 10^6:
 //! residual estimator, no known solution, no files, one thread, from the scene file to the solution in memory. `-- --to 1e7` goes further, `--only constant/square` takes some of the scenes,
-//! `--repeat 3` takes the least times of three, `--threads 2` compares two threads with one on the largest size, `--plot` draws
+//! `--theta 0.8` marks by another bulk parameter than the default, `--repeat 3` takes the least times of three, `--threads 2` compares two threads with one on the largest size, `--plot` draws
 //! `docs/pictures/growth.svg` with Python. Tables are printed as the documentation quotes them.
 //!
 //! Every measurement is a process of its own (this program started anew), so that its peak of memory and its page faults are its own.
@@ -92,12 +92,18 @@ fn digest(level: &Level) -> String {
     checksum(&bytes)
 }
 
-/// One run; what was measured, as lines `name=value`, and the text that tells whether results are the same.
+/// One run; what was measured, as lines `name=value`, and the text that tells whether results are the same. `scene@0.8` is the scene with that theta.
 fn measure(scene: &str, limit: usize, threads: usize) -> (HashMap<&'static str, f64>, String) {
     let before = status("VmRSS");
     let (clock, processor) = (Instant::now(), processor_seconds());
+    let (scene, theta) = scene
+        .split_once('@')
+        .map_or((scene, None), |(s, t)| (s, Some(t)));
     let mut scene = scene::load(&scene_file(scene), &[]).expect("the scene is valid");
     scene.settings.solve.threads = threads;
+    if let Some(theta) = theta {
+        scene.settings.mark.theta = theta.parse().expect("a number");
+    }
     scene.settings.stop = Stop {
         relative_error: None,
         error: None,
@@ -336,13 +342,16 @@ fn main() -> ExitCode {
         .into_iter()
         .filter(|(scene, _)| only.is_none_or(|names| names.split('/').any(|name| name == *scene)))
         .collect();
+    let theta = arguments.iter().position(|a| a == "--theta");
+    let theta = theta.and_then(|at| arguments.get(at + 1));
+    let run = |scene: &str| theta.map_or_else(|| scene.into(), |theta| format!("{scene}@{theta}"));
     for &(scene, title) in &scenes {
         let mut sizes = Vec::new();
         for limit in limits_to(largest) {
             let times = if limit <= TWICE { 2 } else { 1 };
-            let mut m = Measured::of(scene, limit, 1, times);
+            let mut m = Measured::of(&run(scene), limit, 1, times);
             for _ in 1..repeat {
-                m.and(&Measured::of(scene, limit, 1, times));
+                m.and(&Measured::of(&run(scene), limit, 1, times));
             }
             eprintln!("{scene} {limit}: {:.3} s", m.get("wall"));
             sizes.push(m);
@@ -366,7 +375,7 @@ fn main() -> ExitCode {
     if let Some(threads) = value("--threads") {
         println!("\n| scene | vertices | threads | wall s | times faster |\n|---|---|---|---|---|");
         for &(scene, _) in &scenes {
-            compare_threads(scene, largest, threads, repeat);
+            compare_threads(&run(scene), largest, threads, repeat);
         }
         println!("\nThe last record and the displacements have the same bits for all of them.");
     }
