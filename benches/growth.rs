@@ -27,17 +27,6 @@ mod limits;
 #[global_allocator]
 static ALLOCATOR: memory::HugePages = memory::HugePages;
 
-/// Least seconds of several calls.
-fn best(repeat: usize, mut work: impl FnMut() -> f64) -> f64 {
-    let mut least = f64::INFINITY;
-    for _ in 0..repeat {
-        let clock = Instant::now();
-        std::hint::black_box(work());
-        least = least.min(clock.elapsed().as_secs_f64());
-    }
-    least
-}
-
 /// Name of the scene's file and what a table calls it.
 const SCENES: [(&str, &str); 3] = [
     ("constant", "L-shape, constant loads"),

@@ -12,7 +12,6 @@ mod limits;
 mod ours;
 
 use std::process::ExitCode;
-use std::time::Instant;
 
 #[global_allocator]
 static ALLOCATOR: memory::HugePages = memory::HugePages;
@@ -52,17 +51,6 @@ impl Job {
     }
 }
 
-/// Least seconds of several calls.
-pub fn best(repeat: usize, mut work: impl FnMut() -> f64) -> f64 {
-    let mut least = f64::INFINITY;
-    for _ in 0..repeat {
-        let clock = Instant::now();
-        std::hint::black_box(work());
-        least = least.min(clock.elapsed().as_secs_f64());
-    }
-    least
-}
-
 fn times(kernels: &[&Kernel]) {
     println!("one thread, the best of several; other programs on the machine disturb\n");
     let triad = limits::print().triad;
@@ -72,7 +60,7 @@ fn times(kernels: &[&Kernel]) {
     );
     for kernel in kernels {
         let Job { units, mut work } = (kernel.job)(Size::Timed);
-        let nanoseconds = 1e9 * best(5, &mut *work) / units as f64;
+        let nanoseconds = 1e9 * limits::best(5, &mut *work) / units as f64;
         // How many bytes the machine could have streamed in that time.
         let bytes = nanoseconds * triad;
         println!(

@@ -25,8 +25,8 @@ fn of(
     grade: Grade,
     poincare: f64,
 ) -> Certificate {
-    let load = [&*problem.load[0], &*problem.load[1]];
-    let tension = [&*problem.tension[0], &*problem.tension[1]];
+    let load = problem.loads();
+    let tension = problem.tensions();
     let mean = &level.discrete.tension_mean;
     let moments = match &level.moments {
         Some(moments) => moments.clone(),
@@ -282,16 +282,7 @@ fn certificate_marks_like_the_true_error() {
                 let squares = if by_error {
                     errors.energy_squared
                 } else {
-                    let given = Given {
-                        mesh,
-                        load: [&*problem.load[0], &*problem.load[1]],
-                        tension: [&*problem.tension[0], &*problem.tension[1]],
-                        moments: &moments,
-                        loads: &discrete.loads,
-                        tension_mean: &discrete.tension_mean,
-                        displacement: &solution.displacement,
-                        force: &solution.force,
-                    };
+                    let given = adapt::given(&problem, &discrete, &moments, &solution);
                     let found = certify(&given, Grade::Rt0, POINCARE).expect("good data");
                     found.local.iter().map(|l| l * l).collect()
                 };

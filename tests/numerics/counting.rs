@@ -9,7 +9,7 @@ use adapt::settings::{Estimate, Estimator, Final, Stop};
 use adapt::{Before, Level, Problem, Reason, Settings};
 use contact::{Cycles, DiscreteProblem, Solution, Solver, Start, Tolerance, Workspace};
 use estimate::certificate::POINCARE;
-use estimate::{Certificate, Given, Grade, Moments};
+use estimate::{Certificate, Grade, Moments};
 use fem_core::{Children, Mesh, TriangleId};
 
 /// What is promised of a case.
@@ -261,16 +261,7 @@ fn certificate(
     moments: &Moments,
     solution: &Solution,
 ) -> Certificate {
-    let given = Given {
-        mesh: &discrete.mesh,
-        load: [&*problem.load[0], &*problem.load[1]],
-        tension: [&*problem.tension[0], &*problem.tension[1]],
-        moments,
-        loads: &discrete.loads,
-        tension_mean: &discrete.tension_mean,
-        displacement: &solution.displacement,
-        force: &solution.force,
-    };
+    let given = adapt::given(problem, discrete, moments, solution);
     estimate::certify(&given, Grade::Rt0, POINCARE).expect("good data")
 }
 

@@ -61,7 +61,7 @@ pub fn discretise(
     mesh: &Arc<Mesh>,
     threads: usize,
 ) -> Result<DiscreteProblem, DataError> {
-    let load = [&*problem.load[0], &*problem.load[1]];
+    let load = problem.loads();
     let loads = || load_pair_relative_to(&Reference::of(&problem.mesh, load)?, mesh, load, threads);
     assemble(problem, mesh, None, loads)
 }
@@ -76,7 +76,7 @@ pub fn discretise_carried(
     before: Before<'_>,
     threads: usize,
 ) -> Result<DiscreteProblem, DataError> {
-    let load = [&*problem.load[0], &*problem.load[1]];
+    let load = problem.loads();
     let loads = || load_pair_carried(mesh, load, &before.discrete.loads, before.parent, threads);
     assemble(problem, mesh, Some(before), loads)
 }
@@ -86,15 +86,10 @@ pub fn discretise_carried(
 /// # Errors
 /// As [`discretise`].
 pub fn moments(problem: &Problem, discrete: &DiscreteProblem) -> Result<Moments, DataError> {
-    let fields = Fields::of(problem, discrete)?;
-    let Fields { load, tension, .. } = fields;
+    let reference = reference(problem, discrete)?;
+    let (load, tension) = (problem.loads(), problem.tensions());
     let mesh = &discrete.mesh;
-    Ok(Moments::relative_to(
-        &fields.reference,
-        mesh,
-        load,
-        tension,
-    )?)
+    Ok(Moments::relative_to(&reference, mesh, load, tension)?)
 }
 
 /// The same, with samples only where a certificate of a solution with these action forces needs them.
@@ -106,51 +101,17 @@ pub(crate) fn moments_near(
     discrete: &DiscreteProblem,
     force: &[f64],
 ) -> Result<Moments, DataError> {
-    let fields = Fields::of(problem, discrete)?;
-    let Fields { load, tension, .. } = fields;
+    let reference = reference(problem, discrete)?;
+    let (load, tension) = (problem.loads(), problem.tensions());
     let mesh = &discrete.mesh;
-    Ok(Moments::near(
-        &fields.reference,
-        mesh,
-        load,
-        tension,
-        force,
-    )?)
+    Ok(Moments::near(&reference, mesh, load, tension, force)?)
 }
 
-/// Adds the samples that these forces make matter, or all there are.
-///
-/// # Errors
-/// A value of a load that is not finite.
-pub(crate) fn cover(
-    moments: &mut Moments,
-    problem: &Problem,
-    mesh: &Mesh,
-    force: Option<&[f64]>,
-) -> Result<(), FieldError> {
-    let load = [&*problem.load[0], &*problem.load[1]];
-    let tension = [&*problem.tension[0], &*problem.tension[1]];
-    moments.cover(mesh, load, tension, force)
-}
-
-/// The data of a problem and what its elements are judged by.
-struct Fields<'a> {
-    reference: Reference,
-    load: [&'a dyn Field; 2],
-    tension: [&'a dyn Field; 2],
-}
-
-impl<'a> Fields<'a> {
-    fn of(problem: &'a Problem, discrete: &DiscreteProblem) -> Result<Self, FieldError> {
-        let load = [&*problem.load[0], &*problem.load[1]];
-        Ok(Fields {
-            reference: match discrete.loads[0].reference() {
-                Some(reference) => reference,
-                None => Reference::of(&problem.mesh, load)?,
-            },
-            load: [load[0], load[1]],
-            tension: [&*problem.tension[0], &*problem.tension[1]],
-        })
+/// What the elements were judged by.
+fn reference(problem: &Problem, discrete: &DiscreteProblem) -> Result<Reference, FieldError> {
+    match discrete.loads[0].reference() {
+        Some(reference) => Ok(reference),
+        None => Reference::of(&problem.mesh, problem.loads()),
     }
 }
 

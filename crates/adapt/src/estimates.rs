@@ -93,14 +93,7 @@ impl Estimates {
             None => None,
         };
         let certificate = match moments {
-            Some(moments) => Some(certified(
-                mesh,
-                discrete,
-                moments,
-                solution,
-                problem,
-                Grade::Rt0,
-            )?),
+            Some(moments) => Some(certified(discrete, moments, solution, problem, Grade::Rt0)?),
             None => None,
         };
         let residual = sweep.residual;
@@ -171,7 +164,6 @@ impl Estimates {
     )]
     pub(crate) fn certify(
         &mut self,
-        mesh: &Mesh,
         discrete: &DiscreteProblem,
         moments: &Moments,
         solution: &Solution,
@@ -179,7 +171,7 @@ impl Estimates {
         grade: Grade,
         drives: bool,
     ) -> Result<f64, FieldError> {
-        let new = certified(mesh, discrete, moments, solution, problem, grade)?;
+        let new = certified(discrete, moments, solution, problem, grade)?;
         let before = self.certificate.as_ref().map_or(0.0, |c| c.bound);
         let ratio = if before > 0.0 {
             new.bound / before
@@ -251,27 +243,25 @@ pub(crate) fn bound_unit(estimator: Estimator, scale: Scale) -> i32 {
 
 /// eta_alg of a solution of a problem by itself.
 pub(crate) fn algebraic(
-    mesh: &Mesh,
     discrete: &DiscreteProblem,
     moments: &Moments,
     solution: &Solution,
     problem: &Problem,
 ) -> Result<f64, FieldError> {
-    estimate::algebraic(&given(mesh, discrete, moments, solution, problem))
+    estimate::algebraic(&given(problem, discrete, moments, solution))
 }
 
 /// What a certificate is made from.
-fn given<'a>(
-    mesh: &'a Mesh,
+pub fn given<'a>(
+    problem: &'a Problem,
     discrete: &'a DiscreteProblem,
     moments: &'a Moments,
     solution: &'a Solution,
-    problem: &'a Problem,
 ) -> Given<'a> {
     Given {
-        mesh,
-        load: [&*problem.load[0], &*problem.load[1]],
-        tension: [&*problem.tension[0], &*problem.tension[1]],
+        mesh: &discrete.mesh,
+        load: problem.loads(),
+        tension: problem.tensions(),
         moments,
         loads: &discrete.loads,
         tension_mean: &discrete.tension_mean,
@@ -285,13 +275,12 @@ fn given<'a>(
 /// # Errors
 /// A value of a load or a tension that is not finite.
 fn certified(
-    mesh: &Mesh,
     discrete: &DiscreteProblem,
     moments: &Moments,
     solution: &Solution,
     problem: &Problem,
     grade: Grade,
 ) -> Result<Certificate, FieldError> {
-    let given = given(mesh, discrete, moments, solution, problem);
+    let given = given(problem, discrete, moments, solution);
     certify(&given, grade, POINCARE)
 }

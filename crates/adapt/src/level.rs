@@ -7,7 +7,7 @@ use contact::{DiscreteProblem, Solution, Start, Tolerance, Workspace};
 use estimate::{Grade, Moments};
 use fem_core::{Mesh, TriangleId, parallel};
 
-use crate::discretise::{Before, DataError, cover, discretise, discretise_carried, moments_near};
+use crate::discretise::{Before, DataError, discretise, discretise_carried, moments_near};
 use crate::estimates::{self, Estimates};
 use crate::output::memory::peak_memory_mb;
 use crate::problem::Problem;
@@ -160,9 +160,8 @@ impl Level {
         let forecast_here = forecast.on(&mesh);
         let target = expected.map(|size| {
             // Where the certificate will be asked for, the solver goes at once as far as that wants it.
-            let settled = (settings.solve.tolerance == Tolerance::Balanced)
-                .then(|| forecast.settled(size, &mesh))
-                .flatten()
+            let settled = forecast
+                .settled(size, &mesh)
                 .filter(|_| forecast_here.is_some() && last(self, &mesh, size));
             settled.unwrap_or(BALANCE * size)
         });
@@ -350,8 +349,7 @@ impl Level {
                 break;
             };
             let clock = Instant::now();
-            let (mesh, discrete) = (&self.mesh, &self.discrete);
-            let found = estimates::algebraic(mesh, discrete, &moments, &self.solution, problem)?;
+            let found = estimates::algebraic(&self.discrete, &moments, &self.solution, problem)?;
             self.record.seconds_estimate += clock.elapsed().as_secs_f64();
             let share = AHEAD * SETTLED * size;
             if settings.solve.tolerance != Tolerance::Balanced || found <= share {
@@ -359,12 +357,8 @@ impl Level {
             }
             self.solve_on(context, AHEAD * algebraic * share / found, workspace)?;
             estimated = false;
-            cover(
-                &mut moments,
-                problem,
-                &self.mesh,
-                Some(&self.solution.force),
-            )?;
+            let (load, tension) = (problem.loads(), problem.tensions());
+            moments.cover(&self.mesh, load, tension, Some(&self.solution.force))?;
         }
         self.moments = Some(moments);
         if estimated {
@@ -398,7 +392,8 @@ impl Level {
     pub(crate) fn sharpen(&mut self, context: Context<'_>) -> Result<f64, LevelError> {
         if let Some(moments) = &mut self.moments {
             let clock = Instant::now();
-            cover(moments, context.problem, &self.mesh, None)?;
+            let problem = context.problem;
+            moments.cover(&self.mesh, problem.loads(), problem.tensions(), None)?;
             self.record.seconds_assemble += clock.elapsed().as_secs_f64();
         }
         let ratio = self.add_certificate(Grade::Rt1, context)?;
@@ -415,12 +410,10 @@ impl Level {
             return Ok(1.0);
         };
         let clock = Instant::now();
-        let (mesh, discrete, solution) = (&self.mesh, &self.discrete, &self.solution);
         let ratio = self.estimates.certify(
-            mesh,
-            discrete,
+            &self.discrete,
             moments,
-            solution,
+            &self.solution,
             problem,
             grade,
             settings.estimate.estimator == Estimator::Certified,

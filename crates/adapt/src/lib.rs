@@ -23,7 +23,7 @@ pub mod settings;
 
 pub use assurance::Assurance;
 pub use discretise::{Before, DataError, discretise, discretise_carried, moments};
-pub use estimates::Estimates;
+pub use estimates::{Estimates, given};
 pub use level::Level;
 pub use mark::mark;
 pub use problem::Problem;

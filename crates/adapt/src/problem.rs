@@ -21,3 +21,15 @@ pub struct Problem {
     /// The exact solution, if known.
     pub exact: Option<Exact>,
 }
+
+impl Problem {
+    /// The loads f_1, f_2.
+    pub fn loads(&self) -> [&dyn Field; 2] {
+        self.load.each_ref().map(|f| &**f)
+    }
+
+    /// The tensions mu_1, mu_2.
+    pub fn tensions(&self) -> [&dyn Field; 2] {
+        self.tension.each_ref().map(|f| &**f)
+    }
+}

@@ -18,7 +18,7 @@ use crate::action::nodal_action;
 use crate::energy::Energy;
 use crate::residual::contact_term;
 use crate::squares::Squares;
-use data::{Constants, Data, Even, Loaded};
+use data::{Data, Even, Loaded};
 
 /// What one pass tells of a level; scaled.
 #[derive(Clone, Debug)]
@@ -59,8 +59,8 @@ pub fn sweep(
     };
     match problem.loads.each_ref().map(Loads::same) {
         [Some(f), Some(g)] => {
-            let load = [f, g];
-            wanted(level, residual, &Constants { even, load })
+            let loads = [f, g];
+            wanted(level, residual, &Loaded { even, loads })
         }
         _ => {
             let loads = &problem.loads;

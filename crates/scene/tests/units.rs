@@ -172,9 +172,9 @@ fn everything_inside_is_of_order_one() {
             all.map(|bits| f64::from_bits(bits).abs())
                 .fold(0.0, f64::max)
         };
-        let mu = largest(&[&*problem.tension[0], &*problem.tension[1]]);
+        let mu = largest(&problem.tensions());
         assert!((1.0..4.0).contains(&mu), "{mu}");
-        let f = largest(&[&*problem.load[0], &*problem.load[1]]);
+        let f = largest(&problem.loads());
         let g = largest(&[&*problem.height[0], &*problem.height[1]]);
         assert!(f < 2.0 && g < 2.0 && f.max(g) > 0.1, "{f} {g}");
     }

@@ -111,8 +111,8 @@ pub(crate) fn certificate(
     let Some(moments) = &level.moments else {
         return Ok(None);
     };
-    let load = [&*problem.load[0], &*problem.load[1]];
-    let tension = [&*problem.tension[0], &*problem.tension[1]];
+    let load = problem.loads();
+    let tension = problem.tensions();
     let given = Given {
         mesh: level.mesh,
         load,

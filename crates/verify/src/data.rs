@@ -67,9 +67,9 @@ impl<'a> Discrete<'a> {
             }
         }
         // The run judged its elements by the loads on the initial mesh.
-        let load = [&*problem.load[0], &*problem.load[1]];
+        let load = problem.loads();
         let reference = Reference::of(&problem.mesh, load)?;
-        let tension = [&*problem.tension[0], &*problem.tension[1]];
+        let tension = problem.tensions();
         let moments = certified
             .then(|| Moments::near(&reference, mesh, load, tension, &nodal.force))
             .transpose()?;

@@ -110,10 +110,8 @@ fn bound(eta: f64, contact: f64) -> f64 {
 /// # Errors
 /// A value of a load or a tension that is not finite.
 pub fn certify(given: &Given<'_>, grade: Grade, poincare: f64) -> Result<Certificate, FieldError> {
-    let covered = covered(given, grade)?;
-    let given = &covered
-        .as_ref()
-        .map_or(*given, |moments| Given { moments, ..*given });
+    let mut room = None;
+    let given = &covered(given, grade, &mut room)?;
     let (shares, flux) = Shares::of(given);
     match grade {
         Grade::Rt0 => {
@@ -132,23 +130,25 @@ pub fn certify(given: &Given<'_>, grade: Grade, poincare: f64) -> Result<Certifi
 /// # Errors
 /// A value of a load that is not finite.
 pub fn algebraic(given: &Given<'_>) -> Result<f64, FieldError> {
-    let covered = covered(given, Grade::Rt0)?;
-    let given = &covered
-        .as_ref()
-        .map_or(*given, |moments| Given { moments, ..*given });
+    let mut room = None;
+    let given = &covered(given, Grade::Rt0, &mut room)?;
     let low = [0, 1].map(|i| given.moments.stiffness_low[i].least());
     Ok(Shares::of(given).0.algebraic(given.mesh, low))
 }
 
-/// The moments with what a grade wants and they lack, if they lack anything.
-fn covered(given: &Given<'_>, grade: Grade) -> Result<Option<Moments>, FieldError> {
+/// The same with moments that lack nothing that a grade wants: made in `room`, unless they are there.
+fn covered<'a>(
+    given: &Given<'a>,
+    grade: Grade,
+    room: &'a mut Option<Moments>,
+) -> Result<Given<'a>, FieldError> {
     let force = (grade == Grade::Rt0).then_some(given.force);
     if given.moments.missing(given.mesh, force).is_empty() {
-        return Ok(None);
+        return Ok(*given);
     }
-    let mut moments = given.moments.clone();
+    let moments = room.insert(given.moments.clone());
     moments.cover(given.mesh, given.load, given.tension, force)?;
-    Ok(Some(moments))
+    Ok(Given { moments, ..*given })
 }
 
 /// Norms and sums over the elements.

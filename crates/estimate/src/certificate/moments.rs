@@ -21,7 +21,7 @@ fn product(k: usize, l: usize) -> usize {
 
 /// Where the moments of an element are among those that are kept.
 #[derive(Clone, Debug)]
-enum Products3 {
+enum Integrals {
     /// Loads and lambda* are constants; lambda* is this one.
     Constant(f64),
     /// The place of every element, [`NOWHERE`] where it was not sampled, and the products of f_1, f_2 and lambda* there.
@@ -74,7 +74,7 @@ impl Values {
 #[derive(Clone, Debug)]
 pub struct Moments {
     /// Of the loads and of lambda*.
-    products: Products3,
+    products: Integrals,
     /// Mean of 1/mu_i.
     pub(super) softness: [Values; 2],
     /// A lower bound for mu_i, from its samples and their trend towards the corners.
@@ -125,10 +125,7 @@ impl Moments {
         load: [&dyn Field; 2],
         tension: [&dyn Field; 2],
     ) -> Result<Moments, FieldError> {
-        let mut moments = Moments::empty(reference, mesh, load, tension);
-        moments.complete = true;
-        moments.sample(mesh, load, tension, |_| true)?;
-        Ok(moments)
+        Moments::made(reference, mesh, load, tension, None)
     }
 
     /// Integrates where it matters for a pair with these action forces, one a vertex; see [`Moments::cover`].
@@ -142,11 +139,21 @@ impl Moments {
         tension: [&dyn Field; 2],
         force: &[f64],
     ) -> Result<Moments, FieldError> {
+        Moments::made(reference, mesh, load, tension, Some(force))
+    }
+
+    fn made(
+        reference: &Reference,
+        mesh: &Mesh,
+        load: [&dyn Field; 2],
+        tension: [&dyn Field; 2],
+        force: Option<&[f64]>,
+    ) -> Result<Moments, FieldError> {
         let mut moments = Moments::empty(reference, mesh, load, tension);
         if moments.complete {
             moments.sample(mesh, load, tension, |_| true)?;
         } else {
-            moments.cover(mesh, load, tension, Some(force))?;
+            moments.cover(mesh, load, tension, force)?;
         }
         Ok(moments)
     }
@@ -178,7 +185,7 @@ impl Moments {
     /// The elements that were not sampled and touch a vertex with a force, or one on the boundary that such a vertex may lend its share to; without forces
     /// all that were not sampled.
     pub(super) fn missing(&self, mesh: &Mesh, force: Option<&[f64]>) -> Vec<usize> {
-        let Products3::Each(place, _) = &self.products else {
+        let Integrals::Each(place, _) = &self.products else {
             return Vec::new();
         };
         if self.complete {
@@ -211,9 +218,9 @@ impl Moments {
         let [m1, m2] = tension.map(|f| f.constant());
         let products = match [f1, f2, m1, m2] {
             [Some(f1), Some(f2), Some(m1), Some(m2)] => {
-                Products3::Constant(contact_action([m1, m2], [f1, f2]))
+                Integrals::Constant(contact_action([m1, m2], [f1, f2]))
             }
-            _ => Products3::Each(vec![NOWHERE; count], Vec::new()),
+            _ => Integrals::Each(vec![NOWHERE; count], Vec::new()),
         };
         let per_element = |constant: Option<f64>, of: fn(f64) -> f64, begin: f64| match constant {
             Some(value) => Values::Constant(of(value)),
@@ -221,7 +228,7 @@ impl Moments {
         };
         let varies = m1.is_none() || m2.is_none();
         Moments {
-            complete: varies || matches!(products, Products3::Constant(_)),
+            complete: varies || matches!(products, Integrals::Constant(_)),
             products,
             softness: [m1, m2].map(|m| per_element(m, |m| 1.0 / m, 0.0)),
             stiffness_low: [m1, m2].map(|m| per_element(m, |m| m, f64::INFINITY)),
@@ -239,7 +246,7 @@ impl Moments {
         tension: [&dyn Field; 2],
         wanted: impl Fn(usize) -> bool,
     ) -> Result<(), FieldError> {
-        let Products3::Each(place, products) = &mut self.products else {
+        let Integrals::Each(place, products) = &mut self.products else {
             return Ok(());
         };
         let count = mesh.triangle_count();
@@ -282,8 +289,8 @@ impl Moments {
     #[inline]
     fn product(&self, which: usize, t: usize, area: f64, k: usize, l: usize) -> f64 {
         match &self.products {
-            Products3::Constant(value) => value * area / if k == l { 6.0 } else { 12.0 },
-            Products3::Each(place, products) => products
+            Integrals::Constant(value) => value * area / if k == l { 6.0 } else { 12.0 },
+            Integrals::Each(place, products) => products
                 .get(place[t] as usize)
                 .map_or(0.0, |p| p[which][product(k, l)]),
         }
@@ -299,8 +306,8 @@ impl Moments {
     #[inline]
     pub fn action_hat(&self, t: usize, area: f64, k: usize) -> f64 {
         match &self.products {
-            Products3::Constant(value) => value * area / 3.0,
-            Products3::Each(place, products) => products.get(place[t] as usize).map_or(0.0, |p| {
+            Integrals::Constant(value) => value * area / 3.0,
+            Integrals::Each(place, products) => products.get(place[t] as usize).map_or(0.0, |p| {
                 let p = &p[ACTION];
                 p[product(k, 0)] + p[product(k, 1)] + p[product(k, 2)]
             }),
@@ -318,8 +325,8 @@ impl Moments {
         (k, l): (usize, usize),
     ) -> f64 {
         match &self.products {
-            Products3::Constant(_) => mean * area / if k == l { 6.0 } else { 12.0 },
-            Products3::Each(..) => self.product(i, t, area, k, l),
+            Integrals::Constant(_) => mean * area / if k == l { 6.0 } else { 12.0 },
+            Integrals::Each(..) => self.product(i, t, area, k, l),
         }
     }
 
@@ -335,10 +342,10 @@ impl Moments {
     /// The products of an element that is sampled.
     fn each(&mut self, t: usize) -> &mut [Products] {
         match &mut self.products {
-            Products3::Each(place, products) => products
+            Integrals::Each(place, products) => products
                 .get_mut(place[t] as usize)
                 .map_or(&mut [], |p| &mut p[..]),
-            Products3::Constant(_) => &mut [],
+            Integrals::Constant(_) => &mut [],
         }
     }
 

@@ -40,44 +40,42 @@ impl Even {
     }
 }
 
-/// Loads too that are the same everywhere.
-pub(super) struct Constants {
-    pub even: Even,
-    pub load: [f64; 2],
+/// Element means of loads.
+pub(super) trait Means {
+    /// Whether the loads deviate from them.
+    const VARYING: bool;
+
+    /// f_ih.
+    fn means(&self, t: usize) -> [f64; 2];
 }
 
-impl Data for Constants {
+/// Loads that are the same everywhere.
+impl Means for [f64; 2] {
     const VARYING: bool = false;
 
     #[inline(always)]
-    fn tensions(&self, _: usize) -> [f64; 2] {
-        self.even.tension
-    }
-
-    #[inline(always)]
-    fn softness(&self, _: usize) -> [f64; 2] {
-        self.even.softness
-    }
-
-    #[inline(always)]
-    fn stiffer(&self, _: usize, _: usize) -> [f64; 2] {
-        self.even.softness
-    }
-
-    #[inline(always)]
     fn means(&self, _: usize) -> [f64; 2] {
-        self.load
+        *self
     }
 }
 
-/// Constant tensions and any loads.
-pub(super) struct Loaded<'a> {
-    pub even: Even,
-    pub loads: &'a [Loads; 2],
+impl Means for &[Loads; 2] {
+    const VARYING: bool = true;
+
+    #[inline(always)]
+    fn means(&self, t: usize) -> [f64; 2] {
+        self.each_ref().map(|f| f.mean(t))
+    }
 }
 
-impl Data for Loaded<'_> {
-    const VARYING: bool = true;
+/// Constant tensions, and loads.
+pub(super) struct Loaded<L> {
+    pub even: Even,
+    pub loads: L,
+}
+
+impl<L: Means> Data for Loaded<L> {
+    const VARYING: bool = L::VARYING;
 
     #[inline(always)]
     fn tensions(&self, _: usize) -> [f64; 2] {
@@ -96,7 +94,7 @@ impl Data for Loaded<'_> {
 
     #[inline(always)]
     fn means(&self, t: usize) -> [f64; 2] {
-        self.loads.each_ref().map(|f| f.mean(t))
+        self.loads.means(t)
     }
 }
 
@@ -121,6 +119,6 @@ impl Data for &DiscreteProblem {
 
     #[inline(always)]
     fn means(&self, t: usize) -> [f64; 2] {
-        self.loads.each_ref().map(|f| f.mean(t))
+        (&self.loads).means(t)
     }
 }
