@@ -34,7 +34,7 @@ impl<U: Unknowns> Levels<U> {
                 let couplings = &self.old_coupling[entries.clone()];
                 for (&edge, &a) in hierarchy.old_entry[entries].iter().zip(couplings) {
                     let other = &mut r[edge.other()];
-                    *other = U::minus_transposed(*other, a, step);
+                    *other = U::minus_transposed(*other, U::full(a), step);
                 }
             }
             for (rest, &q) in self.old_residual[rows].iter_mut().zip(vertices) {
@@ -88,7 +88,7 @@ impl<U: Unknowns> Levels<U> {
                 let mut rest = rest;
                 let couplings = &self.old_coupling[entries.clone()];
                 for (&edge, &a) in hierarchy.old_entry[entries].iter().zip(couplings) {
-                    rest = U::minus(rest, a, c[edge.other()]);
+                    rest = U::minus(rest, U::full(a), c[edge.other()]);
                 }
                 c[q as usize] = U::times(pivot, rest);
             }
@@ -108,7 +108,7 @@ impl<U: Unknowns> Levels<U> {
             .iter()
             .zip(&self.old_coupling[entries])
         {
-            rest = U::minus(rest, a, c[edge.other()]);
+            rest = U::minus(rest, U::full(a), c[edge.other()]);
         }
         rest
     }

@@ -16,8 +16,8 @@ pub(crate) struct Levels<U: Unknowns> {
     pub coupling: Vec<U::Coupling>,
     /// After a sweep: of every vertex the inverse diagonal block on that level.
     pub pivot: Vec<U::Pivot>,
-    /// Entries of the old rows, seen from the old vertex.
-    pub old_coupling: Vec<U::Coupling>,
+    /// Entries of the old rows, seen from the old vertex; only the cycle reads them, and nothing comes of their rounding.
+    pub old_coupling: Vec<U::Light>,
     /// Inverse diagonal blocks of the old rows.
     pub old_pivot: Vec<U::Pivot>,
     /// Scratch of a cycle: what the way down did to the old rows.
@@ -40,7 +40,7 @@ impl<U: Unknowns> Levels<U> {
         self.pivot.clear();
         self.pivot.reserve_exact(hierarchy.len());
         let entries = hierarchy.old_entry.len();
-        self.old_coupling.resize(entries, U::Coupling::default());
+        self.old_coupling.resize(entries, U::Light::default());
         self.old_pivot.resize(rows, U::Pivot::default());
         self.old_step.resize(rows, U::Value::default());
         self.old_residual.resize(rows, U::Value::default());
@@ -203,11 +203,11 @@ impl<U: Unknowns> Levels<U> {
             let couplings = self.old_coupling[entries.clone()].iter_mut();
             for (to, &edge) in couplings.zip(&hierarchy.old_entry[entries]) {
                 let c = self.coupling[hierarchy.slot_of(q, edge)];
-                *to = if q as usize > edge.other() {
+                *to = U::light(if q as usize > edge.other() {
                     c
                 } else {
                     U::transpose(c)
-                };
+                });
             }
         }
     }

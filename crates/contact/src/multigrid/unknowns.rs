@@ -19,6 +19,8 @@ pub(crate) trait Unknowns: Copy + Default {
     type Plain: Copy + Default;
     /// Block between two vertices.
     type Coupling: Block;
+    /// The same in single precision: enough where nothing is summed up, and half the memory.
+    type Light: Copy + Default;
     /// Symmetric diagonal block, or its (pseudo-)inverse.
     type Pivot: Symmetric<Self::Coupling>;
 
@@ -74,6 +76,10 @@ pub(crate) trait Unknowns: Copy + Default {
 
     /// The transposed block.
     fn transpose(c: Self::Coupling) -> Self::Coupling;
+    /// Rounds a block to single precision.
+    fn light(c: Self::Coupling) -> Self::Light;
+    /// A rounded block.
+    fn full(c: Self::Light) -> Self::Coupling;
     /// x + y/2.
     fn plus_half(x: Self::Coupling, y: Self::Coupling) -> Self::Coupling;
     /// Row a, column b: the edge that p halved, (C_pa' + C_pb)/2 + D_p/4.
@@ -97,6 +103,7 @@ impl Unknowns for Scalar {
     type Value = f64;
     type Plain = f64;
     type Coupling = f64;
+    type Light = f32;
     type Pivot = f64;
 
     #[inline]
@@ -204,6 +211,14 @@ impl Unknowns for Scalar {
         c
     }
     #[inline]
+    fn light(c: f64) -> f32 {
+        c as f32
+    }
+    #[inline]
+    fn full(c: f32) -> f64 {
+        f64::from(c)
+    }
+    #[inline]
     fn plus_half(x: f64, y: f64) -> f64 {
         x + 0.5 * y
     }
@@ -242,6 +257,7 @@ impl Unknowns for Pair {
     type Value = [f64; 2];
     type Plain = [f64; 2];
     type Coupling = [[f64; 2]; 2];
+    type Light = [[f32; 2]; 2];
     type Pivot = [f64; 3];
 
     #[inline]
@@ -384,6 +400,14 @@ impl Unknowns for Pair {
     #[inline]
     fn transpose(c: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
         [[c[0][0], c[1][0]], [c[0][1], c[1][1]]]
+    }
+    #[inline]
+    fn light(c: [[f64; 2]; 2]) -> [[f32; 2]; 2] {
+        c.map(|row| row.map(|c| c as f32))
+    }
+    #[inline]
+    fn full(c: [[f32; 2]; 2]) -> [[f64; 2]; 2] {
+        c.map(|row| row.map(f64::from))
     }
     #[inline]
     fn plus_half(x: [[f64; 2]; 2], y: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
