@@ -352,6 +352,32 @@ pub struct How {
     pub certified: bool,
 }
 
+/// What a run left on every mesh that multigrid solved: its vertices, and the energy norm of the difference to the solution, over a fifth
+/// of the residual estimator.
+pub fn left_by_a_run(case: &Case, theta: f64, vertices: usize) -> Vec<(usize, f64)> {
+    let (problem, mut settings) = case.load(Children::Four);
+    settings.mark.theta = theta;
+    settings.stop = Stop {
+        vertices: Some(vertices),
+        ..Stop::default()
+    };
+    let mut left = Vec::new();
+    let mut watch = |level: &Level, _: Option<Reason>| -> Result<(), OutputError> {
+        let (discrete, solution) = (&level.discrete, &level.solution);
+        if solution.info.cycles.is_some() {
+            let tight = multigrid(Tolerance::Relative(1e-10), None);
+            let again = Start::again(solution);
+            let exact = contact::solve(discrete, &tight, Some(&again)).expect("solved");
+            let residual = level.estimates.residual.as_ref().expect("wanted").total();
+            let error = energy_difference(discrete, solution, &exact);
+            left.push((discrete.order(), error / (0.2 * residual)));
+        }
+        Ok(())
+    };
+    adapt::run(&problem, &settings, &mut watch).unwrap_or_else(|e| panic!("{e}"));
+    left
+}
+
 /// Runs a case, and counts on the first mesh with as many vertices as each of `sizes`, which grow.
 pub fn along_a_run(case: &Case, how: How, sizes: &[usize], mut see: impl FnMut(Counts)) {
     let (problem, mut settings) = case.load(how.children);

@@ -3,7 +3,7 @@
 
 use fem_core::Children;
 
-use crate::counting::{Case, Counts, Group, How, along_a_run, by_single_steps};
+use crate::counting::{Case, Counts, Group, How, along_a_run, by_single_steps, left_by_a_run};
 
 /// What a case must keep.
 struct Limits {
@@ -141,6 +141,21 @@ fn steps_until_the_algebraic_part_of_the_certificate_is_small() {
     for case in cases(one_field) {
         let found = checked(&case, certified, &[30_000]);
         assert!(found[0].settled.is_some());
+    }
+}
+
+/// However far apart the meshes are: where one step leaves more than the run aims for, 0.04 of the residual estimator or a fifth of the error, it makes another.
+#[test]
+fn runs_keep_the_algebraic_error_small() {
+    for case in Case::all() {
+        for theta in [0.5, 0.8] {
+            let left = left_by_a_run(&case, theta, 60_000);
+            println!("{} {theta}: {left:?}", case.name);
+            assert!(left.len() >= 2, "{}", case.name);
+            for (vertices, part) in left {
+                assert!(part <= 0.2, "{} {theta} {vertices}: {part}", case.name);
+            }
+        }
     }
 }
 
