@@ -5,7 +5,7 @@
 //! instead of two, `--certify` also counts the steps until eta_alg is small, which takes longer than everything else. Then the same at the smallest size after one step on every mesh, and
 //! on meshes of 90 levels. The tests `steps` assert limits on these numbers up to 5e5 vertices. Tables are printed as the documentation quotes them.
 
-use counting::{Case, Counts, Group, How, along_a_run, by_single_steps};
+use counting::{Case, Counts, Group, How, along_a_run, by_single_steps, left_by_a_run};
 use fem_core::Children;
 
 #[path = "../tests/numerics/counting.rs"]
@@ -57,5 +57,16 @@ fn main() {
     );
     for case in cases().filter(|c| c.deepens()) {
         println!("{}", by_single_steps(&case, how, sizes[0], 90).row(&case));
+    }
+    println!(
+        "\nAlgebraic error that a run leaves on its meshes, at most, over a fifth of the residual estimator:\n"
+    );
+    println!("| case | theta 0.5 | theta 0.8 |\n|---|---|---|");
+    for case in cases() {
+        let [half, most] = [0.5, 0.8].map(|theta| {
+            let left = left_by_a_run(&case, theta, sizes[0]);
+            left.iter().map(|l| l.1).fold(0.0, f64::max)
+        });
+        println!("| {} | {half:.3} | {most:.3} |", case.name);
     }
 }

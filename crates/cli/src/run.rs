@@ -26,7 +26,8 @@ pub fn run(arguments: &RunArgs) -> Result<u8, Failure> {
         Some(out) => out.clone(),
         None => default_folder(&arguments.scene),
     };
-    let folder = RunFolder::prepare(&out, arguments.force)?;
+    let folder =
+        RunFolder::prepare(&out, arguments.force)?.with_threads(scene.settings.solve.threads);
     let mut recorder = Recorder::new(
         folder,
         scene.text.clone(),

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::atomic::{TEMPORARY, write_bytes, write_whole};
-use super::checksum::Summed;
+use super::checksum::summed;
 use super::error::OutputError;
 use super::history::write_history;
 use super::pvd::write_series;
@@ -40,6 +40,7 @@ pub struct RunFolder {
     path: PathBuf,
     force: bool,
     begun: bool,
+    threads: usize,
     /// Levels that have a file, ascending.
     levels: Vec<usize>,
     /// SHA-256 of every file written but the summary, by name.
@@ -60,11 +61,17 @@ impl RunFolder {
             path: path.into(),
             force,
             begun: false,
+            threads: 1,
             levels: Vec::new(),
             checksums: BTreeMap::new(),
         };
         folder.check()?;
         Ok(folder)
+    }
+
+    /// Allows so many threads at a time, one at first; the files do not depend on it.
+    pub fn with_threads(self, threads: usize) -> RunFolder {
+        RunFolder { threads, ..self }
     }
 
     /// The folder.
@@ -132,7 +139,7 @@ impl RunFolder {
     /// Those of [`RunFolder::begin`] and [`write_whole`].
     pub fn write_history(&mut self, levels: &[LevelRecord]) -> Result<(), OutputError> {
         self.begin()?;
-        self.write(HISTORY, |writer| write_history(writer, levels))
+        self.write(HISTORY, |mut writer| write_history(&mut writer, levels))
     }
 
     /// Writes `level_NNNN.vtu`, then `series.pvd` with it.
@@ -147,8 +154,11 @@ impl RunFolder {
             self.levels.insert(place, level);
         }
         let files: Vec<(usize, String)> = self.levels.iter().map(|&l| (l, level_file(l))).collect();
-        self.write(SERIES, |writer| {
-            write_series(writer, files.iter().map(|(l, name)| (*l, name.as_str())))
+        self.write(SERIES, |mut writer| {
+            write_series(
+                &mut writer,
+                files.iter().map(|(l, name)| (*l, name.as_str())),
+            )
         })
     }
 
@@ -158,8 +168,8 @@ impl RunFolder {
     /// Those of [`RunFolder::begin`], [`write_whole`] and [`write_edges`].
     pub fn write_edges(&mut self, fields: EdgeFields<'_>) -> Result<(), OutputError> {
         self.begin()?;
-        self.write(&edges_file(fields.level), |writer| {
-            write_edges(writer, fields)
+        self.write(&edges_file(fields.level), |mut writer| {
+            write_edges(&mut writer, fields)
         })
     }
 
@@ -172,13 +182,11 @@ impl RunFolder {
     fn write(
         &mut self,
         name: &str,
-        content: impl FnOnce(&mut Summed<'_>) -> io::Result<()>,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), OutputError> {
         let mut sum = String::new();
         write_whole(&self.path.join(name), |writer| {
-            let mut summed = Summed::new(writer);
-            content(&mut summed)?;
-            sum = summed.finish();
+            sum = summed(writer, self.threads, content)?;
             Ok(())
         })?;
         self.checksums.insert(name.to_owned(), sum);
