@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use contact::{SolveError, Workspace};
 use fem_core::scale::times_power_of_two;
-use fem_core::{FieldError, Mesh, MeshError, Scale};
+use fem_core::{FieldError, Mesh, MeshError, Scale, parallel};
 
 use crate::discretise::DataError;
 use crate::estimates::bound_unit;
@@ -16,8 +16,8 @@ use crate::settings::{Estimator, Final, Settings};
 
 /// Runs solve, estimate, mark and refine until a rule of `settings.stop` holds.
 ///
-/// Every finished level is shown to `observer`, the last one with the reason why it is the last. Nothing in here writes or
-/// prints. A failure on a level after the first leaves everything up to the level before it: that level is shown
+/// Every finished level is shown to `observer`, the last one with the reason why it is the last; with several threads beside the next level, where its fields
+/// are wanted. Nothing in here writes or prints. A failure on a level after the first leaves everything up to the level before it: that level is shown
 /// again through [`Observer::failed`].
 ///
 /// # Errors
@@ -53,10 +53,10 @@ pub fn run(
                 .complete(context, &mut workspace)
                 .map_err(failed(number))?;
         }
-        observer
-            .level(&level, reason)
-            .map_err(|e| failed(number)(e.into()))?;
         if let Some(reason) = reason {
+            observer
+                .level(&level, Some(reason))
+                .map_err(|e| failed(number)(e.into()))?;
             return Ok(Outcome { reason, level });
         }
         let marked = mark(&level.estimates.marking, &settings.mark); // MARK
@@ -66,8 +66,24 @@ pub fn run(
             settings.stop.vertices.is_some_and(full)
                 || reached(settings, before, problem.scale, NEAR * expected).is_some()
         };
-        level = match level.refine(&marked, context, forecast, last, &mut workspace) {
-            // REFINE, SOLVE, ESTIMATE
+        // Fields are written beside the next level.
+        let threads = match settings.output.wants_fields(number, false) {
+            true => settings.solve.threads,
+            false => 1,
+        };
+        let finished = &level;
+        let (shown, next) = if threads > 1 {
+            let next = || finished.refine(&marked, context, forecast, last, &mut workspace);
+            let (next, shown) = parallel::both(threads, next, || observer.level(finished, None));
+            (shown, Some(next))
+        } else {
+            (observer.level(finished, None), None)
+        };
+        shown.map_err(|e| failed(number)(e.into()))?;
+        // REFINE, SOLVE, ESTIMATE
+        let next = next
+            .unwrap_or_else(|| finished.refine(&marked, context, forecast, last, &mut workspace));
+        level = match next {
             Ok(next) => next,
             Err(cause) => {
                 level
