@@ -3,49 +3,16 @@
 //! Nodes are computed when first needed and found again as long as the points for which they were computed are those
 //! that ask: what a branch computed is forgotten at its end, what was computed before it serves inside. A choice
 //! between a few plain operations is made by computing both sides and picking, which a processor does several points
-//! at a time; any other choice splits the points, and each side runs over its own.
+//! at a time; any other choice splits the points, and each side runs over its own. Choices by the same condition that
+//! are all needed split the points once.
 
-use crate::function::{Binary, Unary};
+use crate::function::Binary;
 use crate::graph::{Graph, Id, Node};
+use crate::program::{Op, Operand, Outcome, Program, Side, Split};
 use crate::quotient::Divisor;
 use crate::registers::allocate;
+use crate::share::share;
 use crate::term::{By, Join, Term};
-
-/// Where an instruction finds a value.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Operand {
-    Register(u32),
-    X,
-    Y,
-    Region,
-    Number(f64),
-}
-
-/// The target of an instruction is never one of its operands.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Op {
-    Unary(Unary, u32, Operand),
-    Binary(Binary, u32, Operand, Operand),
-    /// A term of a sum, and what it is joined with.
-    Term(u32, Term, Option<(Join, Operand)>),
-    /// Target, condition, then, else.
-    Select(u32, Operand, Operand, Operand),
-    Copy(u32, Operand),
-    /// Goes on with the points where the condition holds; without any, jumps to the `Else` at that place.
-    Split(Operand, u32),
-    /// Goes on with the other points; without any, jumps to the `Join` at that place.
-    Else(u32),
-    /// Goes on with all points that came to the `Split`.
-    Join,
-}
-
-/// A compiled formula.
-#[derive(Debug, Clone)]
-pub(crate) struct Program {
-    pub(crate) ops: Vec<Op>,
-    pub(crate) registers: usize,
-    pub(crate) result: Operand,
-}
 
 /// Most new plain operations in the two sides of a choice that are both computed.
 const CHEAP_CHOICE: u32 = 8;
@@ -54,8 +21,8 @@ enum Task {
     Need(Id),
     Emit(Id),
     Split(Id),
-    Else(Id, usize),
-    Join(Id, usize),
+    Else,
+    Join,
 }
 
 struct Compiler<'a> {
@@ -64,50 +31,113 @@ struct Compiler<'a> {
     places: Vec<Option<Operand>>,
     /// Nodes placed, in order, to be forgotten at the end of the branch.
     placed: Vec<Id>,
-    /// For each open branch: the length of `placed` at its start and the target of its choice.
-    branches: Vec<(usize, u32)>,
-    /// How many operands each node is.
+    branches: Vec<Branch>,
+    /// For the whole and each open branch: the choices that are needed there and split the points, in order of their conditions, which come first.
+    choices: Vec<Vec<(Id, Id)>>,
+    /// Which survey came to a node last, and how many there were.
+    surveyed: Vec<u32>,
+    surveys: u32,
+    /// How many operands and results each node is.
     uses: Vec<u32>,
+    /// Instructions that are not plain.
+    costly: u32,
     virtuals: u32,
 }
 
-pub(crate) fn compile(graph: &Graph, root: Id) -> Program {
-    let mut uses = vec![0; graph.nodes().len()];
-    for id in graph.nodes().iter().flat_map(|node| node.operands()) {
+/// An open branch.
+struct Branch {
+    /// Length of `placed` at its start.
+    mark: usize,
+    /// The choices that it is a side of; they have the same condition.
+    choices: Vec<Id>,
+    /// The values of the first side, once they are known.
+    then: Vec<Operand>,
+    /// Place of its `Split`.
+    split: usize,
+    /// `costly` at its start.
+    costly: u32,
+}
+
+pub(crate) fn compile(graph: &Graph, roots: &[Id]) -> Program {
+    let count = graph.nodes().len();
+    let mut uses = vec![0; count];
+    let operands = graph.nodes().iter().flat_map(|node| node.operands());
+    for id in operands.chain(roots.iter().copied()) {
         uses[id.index()] += 1;
     }
     let mut compiler = Compiler {
         graph,
         ops: Vec::new(),
-        places: vec![None; graph.nodes().len()],
+        places: vec![None; count],
         placed: Vec::new(),
         branches: Vec::new(),
+        choices: Vec::new(),
+        surveyed: vec![0; count],
+        surveys: 0,
         uses,
+        costly: 0,
         virtuals: 0,
     };
-    compiler.run(root);
-    let result = compiler.operand(root);
-    allocate(compiler.ops, compiler.virtuals as usize, result)
+    let (roots, factors): (Vec<Id>, Vec<f64>) =
+        roots.iter().map(|root| compiler.scaled(*root)).unzip();
+    compiler.survey(roots.clone());
+    compiler.run(&roots);
+    let values = roots.iter().map(|root| compiler.operand(*root));
+    let outcomes = values.zip(factors);
+    let results: Vec<Outcome> = outcomes
+        .map(|(value, factor)| Outcome { value, factor })
+        .collect();
+    let virtuals = compiler.virtuals as usize;
+    let ops = share(compiler.ops, virtuals, &results);
+    allocate(ops, virtuals, results)
 }
 
 impl Compiler<'_> {
-    fn run(&mut self, root: Id) {
-        let mut tasks = vec![Task::Need(root)];
+    /// The root as a product of a node and a number.
+    fn scaled(&self, root: Id) -> (Id, f64) {
+        let Node::Binary(Binary::Mul, a, b) = self.graph.node(root) else {
+            return (root, 1.0);
+        };
+        match (self.graph.as_number(a), self.graph.as_number(b)) {
+            (_, Some(factor)) => (a, factor),
+            (Some(factor), _) => (b, factor),
+            _ => (root, 1.0),
+        }
+    }
+
+    fn run(&mut self, roots: &[Id]) {
+        let mut tasks: Vec<Task> = roots.iter().rev().map(|root| Task::Need(*root)).collect();
         while let Some(task) = tasks.pop() {
             match task {
                 Task::Need(id) => self.need(id, &mut tasks),
                 Task::Emit(id) => self.emit(id),
                 Task::Split(id) => self.split(id, &mut tasks),
-                Task::Else(id, split) => {
-                    if let Node::If(_, then, _) = self.graph.node(id) {
-                        self.end_branch(then, split);
-                    }
-                    self.jump_from(split);
-                    self.ops.push(Op::Else(0));
-                }
-                Task::Join(id, split) => self.join(id, split),
+                Task::Else => self.other(),
+                Task::Join => self.join(),
             }
         }
+    }
+
+    /// Finds the choices that split the points among what it takes to have these nodes, whatever branches are taken.
+    fn survey(&mut self, roots: Vec<Id>) {
+        self.surveys += 1;
+        let mut found = Vec::new();
+        let mut open = roots;
+        while let Some(id) = open.pop() {
+            if self.surveyed[id.index()] == self.surveys || self.place(id).is_some() {
+                continue;
+            }
+            self.surveyed[id.index()] = self.surveys;
+            match self.graph.node(id) {
+                node @ Node::If(condition, ..) if !self.is_cheap_choice(node) => {
+                    found.push((condition, id));
+                    open.push(condition);
+                }
+                node => open.extend(node.operands()),
+            }
+        }
+        found.sort_unstable();
+        self.choices.push(found);
     }
 
     /// Queues what it takes to have the node, unless it is there.
@@ -126,7 +156,31 @@ impl Compiler<'_> {
         tasks.push(Task::Emit(id));
         let first = tasks.len();
         tasks.extend(node.operands().map(Task::Need));
-        tasks[first..].reverse();
+        // What the operation takes in is to come right before it.
+        if !self.takes_in_left(node) {
+            tasks[first..].reverse();
+        }
+    }
+
+    /// Whether a left operand, but not the right one, may become part of an instruction with the operation.
+    fn takes_in_left(&self, node: Node) -> bool {
+        let is_number = |id: Id| self.graph.as_number(id).is_some();
+        let is_scaled = |id: Id| match self.graph.node(id) {
+            Node::Binary(Binary::Mul, a, b) => is_number(a) || is_number(b),
+            _ => false,
+        };
+        let is_term = |id: Id| match self.graph.node(id) {
+            Node::Binary(Binary::Mul, ..) => true,
+            Node::Binary(Binary::Div, _, b) => is_number(b),
+            _ => false,
+        };
+        let (a, b, is_part): (Id, Id, &dyn Fn(Id) -> bool) = match node {
+            Node::Binary(Binary::Mul, a, b) => (a, b, &is_scaled),
+            Node::Binary(Binary::Add | Binary::Sub, a, b) => (a, b, &is_term),
+            _ => return false,
+        };
+        let takes = |id: Id| is_part(id) && self.uses[id.index()] == 1 && self.place(id).is_none();
+        takes(a) && !takes(b)
     }
 
     fn emit(&mut self, id: Id) {
@@ -143,6 +197,7 @@ impl Compiler<'_> {
             }
             Node::Number(_) | Node::X | Node::Y | Node::Region => return,
         };
+        self.costly += u32::from(!op.is_plain());
         self.ops.push(op);
         self.set_place(id, target);
     }
@@ -217,7 +272,7 @@ impl Compiler<'_> {
     fn last_for(&self, id: Id) -> Option<Op> {
         let last = *self.ops.last()?;
         let mut copy = last;
-        let target = Operand::Register(*copy.target_mut()?);
+        let target = Operand::Register(*copy.targets_mut().next()?);
         let own = self.placed.last() == Some(&id) && self.places[id.index()] == Some(target);
         (own && self.uses[id.index()] == 1).then_some(last)
     }
@@ -229,68 +284,99 @@ impl Compiler<'_> {
         }
     }
 
+    /// Opens the branches of a choice, and of the others by the same condition that are needed too.
     fn split(&mut self, id: Id, tasks: &mut Vec<Task>) {
-        let Node::If(condition, then, other) = self.graph.node(id) else {
+        let Node::If(condition, ..) = self.graph.node(id) else {
             return;
         };
         if self.place(id).is_some() {
             return;
         }
+        let needed: &[(Id, Id)] = self.choices.last().map_or(&[], |needed| needed);
+        let first = needed.partition_point(|(other, _)| *other < condition);
+        let same = needed[first..]
+            .iter()
+            .take_while(|(other, _)| *other == condition);
+        let mut choices: Vec<Id> = same
+            .map(|(_, id)| *id)
+            .filter(|id| self.place(*id).is_none())
+            .collect();
+        if !choices.contains(&id) {
+            choices.push(id);
+        }
+        let [then, other] = [true, false].map(|holds| self.sides(&choices, holds));
         let split = self.ops.len();
-        self.ops.push(Op::Split(self.operand(condition), 0));
-        let target = self.new_register();
-        self.branches.push((self.placed.len(), target));
-        tasks.push(Task::Join(id, split));
-        tasks.push(Task::Need(other));
-        tasks.push(Task::Else(id, split));
-        tasks.push(Task::Need(then));
+        self.ops.push(Op::Split(Split {
+            condition: self.operand(condition),
+            middle: 0,
+            plain: false,
+        }));
+        self.branches.push(Branch {
+            mark: self.placed.len(),
+            choices,
+            then: Vec::new(),
+            split,
+            costly: self.costly,
+        });
+        tasks.push(Task::Join);
+        tasks.extend(other.into_iter().rev().map(Task::Need));
+        tasks.push(Task::Else);
+        tasks.extend(then.iter().rev().map(|id| Task::Need(*id)));
+        self.survey(then);
     }
 
-    fn join(&mut self, id: Id, split: usize) {
-        let Op::Split(_, middle) = self.ops[split] else {
+    /// The values of choices where their condition holds, or where it does not.
+    fn sides(&self, choices: &[Id], holds: bool) -> Vec<Id> {
+        let side = |id: &Id| match self.graph.node(*id) {
+            Node::If(_, then, other) => Some(if holds { then } else { other }),
+            _ => None,
+        };
+        choices.iter().filter_map(side).collect()
+    }
+
+    /// Ends the first branch and begins the second.
+    fn other(&mut self) {
+        let Some(mut branch) = self.branches.pop() else {
             return;
         };
-        if let Node::If(_, _, other) = self.graph.node(id) {
-            self.end_branch(other, middle as usize);
-        }
-        self.jump_from(middle as usize);
+        branch.then = self.end_branch(&branch, true);
+        self.ops.push(Op::Else(0));
+        self.survey(self.sides(&branch.choices, false));
+        self.branches.push(branch);
+    }
+
+    fn join(&mut self) {
+        let Some(branch) = self.branches.pop() else {
+            return;
+        };
+        let others = self.end_branch(&branch, false);
         self.ops.push(Op::Join);
-        if let Some((_, target)) = self.branches.pop() {
+        let Op::Split(split) = &mut self.ops[branch.split] else {
+            return;
+        };
+        split.plain = self.costly == branch.costly;
+        let condition = split.condition;
+        let sides = branch.then.into_iter().zip(others);
+        for (id, (then, other)) in branch.choices.into_iter().zip(sides) {
+            let target = self.new_register();
+            let sides = [then, other].map(|value| Side {
+                value,
+                spent: false,
+            });
+            self.ops.push(Op::Pick(target, condition, sides));
             self.set_place(id, target);
         }
     }
 
-    /// Puts the branch's value into the target of the choice and forgets what the branch computed. `start` is the
-    /// instruction that opened the branch.
-    fn end_branch(&mut self, value: Id, start: usize) {
-        let Some((mark, target)) = self.branches.last().copied() else {
-            return;
-        };
-        let source = self.operand(value);
-        let open = self.ops.len() > start + 1;
-        match self.ops.last_mut() {
-            // Computed by the last instruction of this branch, so nobody else has it: compute it into the target.
-            Some(
-                Op::Unary(_, last, _)
-                | Op::Binary(_, last, ..)
-                | Op::Term(last, ..)
-                | Op::Select(last, ..),
-            ) if open && Operand::Register(*last) == source => {
-                *last = target;
-            }
-            _ => self.ops.push(Op::Copy(target, source)),
-        }
-        for id in self.placed.drain(mark..) {
+    /// Where the branch's values are; forgets what it computed.
+    fn end_branch(&mut self, branch: &Branch, holds: bool) -> Vec<Operand> {
+        let values = self.sides(&branch.choices, holds);
+        let values = values.iter().map(|value| self.operand(*value)).collect();
+        for id in self.placed.drain(branch.mark..) {
             self.places[id.index()] = None;
         }
-    }
-
-    /// Makes the jump at `from` lead to the next instruction.
-    fn jump_from(&mut self, from: usize) {
-        let next = self.ops.len() as u32;
-        if let Op::Split(_, to) | Op::Else(to) = &mut self.ops[from] {
-            *to = next;
-        }
+        self.choices.pop();
+        values
     }
 
     /// Whether both sides of a choice are few plain operations.
@@ -343,101 +429,4 @@ impl Compiler<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lower::lower;
-    use crate::scope::Scope;
-
-    fn program(source: &str) -> Program {
-        let (graph, root) = crate::parser::parse(source, &Scope::new(), true).unwrap();
-        let nodes = crate::graph::prune(graph.nodes(), root);
-        let (graph, root) = lower(&nodes);
-        compile(&graph, root)
-    }
-
-    /// The instructions as one letter each: `s`, `c` sine and cosine, `p` a product, `t` other terms, `+` sums with them, `.`
-    /// others, `(|)` a choice that
-    /// splits, `?` one that does not, `=` a copy.
-    fn shape(source: &str) -> String {
-        let letter = |op: &Op| match op {
-            Op::Unary(Unary::Sin, ..) => 's',
-            Op::Unary(Unary::Cos, ..) => 'c',
-            Op::Binary(Binary::Mul, ..) => 'p',
-            Op::Unary(..) | Op::Binary(..) => '.',
-            Op::Term(_, _, None) => 't',
-            Op::Term(..) => '+',
-            Op::Select(..) => '?',
-            Op::Copy(..) => '=',
-            Op::Split(..) => '(',
-            Op::Else(_) => '|',
-            Op::Join => ')',
-        };
-        program(source).ops.iter().map(letter).collect()
-    }
-
-    #[test]
-    fn common_subexpressions_are_computed_once() {
-        assert_eq!(shape("sin(x*y) + sin(y*x)"), "ps.");
-        assert_eq!(shape("x^2 + x^4 + x^6"), "pp.+");
-        assert_eq!(shape("x^2 + 1/x^2"), "p..");
-    }
-
-    #[test]
-    fn work_of_a_branch_stays_in_it() {
-        assert_eq!(shape("if(x > 0, sin(x), cos(x))"), ".(s|c)");
-        assert_eq!(shape("if(x > 0, sin(x), 2)"), ".(s|=)");
-        assert_eq!(shape("x > 0 && sin(x) > 0"), ".(s.|=)");
-        // Computed before: served inside. Computed inside: computed again outside and in the other branch.
-        assert_eq!(shape("sin(x)*if(x > 0, sin(x)^2, cos(x))"), "s.(p|c)p");
-        assert_eq!(
-            shape("if(x > 0, sin(x)^2, sin(x)*cos(x))*sin(x)"),
-            ".(sp|scp)sp"
-        );
-        assert_eq!(
-            shape("if(x > 0, if(y > 0, sin(x), cos(x)), sin(y))"),
-            ".(.(s|c)=|s)"
-        );
-    }
-
-    #[test]
-    fn cheap_choices_are_made_without_a_split() {
-        assert_eq!(shape("if(x^2 + y^2 < 0.5, -10, -8)"), "p+.?");
-        assert_eq!(shape("if(x > 0 && y > 0, x*y, x - y)"), "..?p.?");
-        let nine = "x*y + x - y + 2*x - 3*y + 1/x + x*x";
-        assert!(shape(&format!("if(x > 0, {nine}, 0)")).contains('('));
-    }
-
-    #[test]
-    fn terms_are_joined_with_what_they_are_added_to() {
-        assert_eq!(shape("y - 3*x"), "+");
-        assert_eq!(shape("y - 3*x/7 + 5*x*y"), "++");
-        assert_eq!(shape("y + x*y/4 - (5*x)*sin(y)"), "p+ps+");
-        assert_eq!(shape("2*x*y/3"), "tt");
-        // Needed twice, or not last.
-        assert_eq!(shape("x*y + sin(x*y)"), "ps.");
-        assert_eq!(shape("x*y + sin(x)"), "ps.");
-        assert_eq!(shape("x/3/5"), "tt");
-        assert_eq!(shape("if(x > 0, x*y, y/3) + sin(x)"), ".pt?s.");
-        let Op::Term(_, term, Some((Join::From, Operand::Y))) = program("y - 3*x/7").ops[0] else {
-            panic!("a term taken from y");
-        };
-        assert_eq!((term.factor, term.of), (3.0, Operand::X));
-        let Op::Term(_, term, _) = program("2*x + y").ops[0] else {
-            panic!("a term and y");
-        };
-        assert_eq!(term.of, Operand::X);
-    }
-
-    #[test]
-    fn registers_are_used_again_and_never_read_while_written() {
-        let chain = program(&format!("x{}", "+sin(x+1)*y".repeat(500)));
-        assert!(chain.registers <= 4, "{}", chain.registers);
-        for op in program("if(x > 0, sin(x)*x + cos(x), sin(y) - x)*sin(x + sin(y))").ops {
-            let mut op = op;
-            let target = op.target_mut().copied();
-            for operand in op.operands_mut() {
-                assert!(target.is_none_or(|target| *operand != Operand::Register(target)));
-            }
-        }
-    }
-}
+mod tests;

@@ -1,33 +1,38 @@
-//! Runs a compiled formula over blocks of points, one instruction at a time for the whole block.
+//! Runs compiled formulas over blocks of points, one instruction at a time for the whole block.
 
-use crate::compile::{Op, Operand, Program};
-use crate::function::{Binary, Unary};
-use crate::term::{By, TermValues};
+use crate::dispatch::{binary, blend, both, compute, copy, unary, values};
+use crate::loops::{STEP, Source, Values};
+use crate::program::{Op, Operand, Program, Side};
 #[cfg(target_arch = "x86_64")]
 use crate::wide::Wide;
 use crate::wide::{Loops, Plain};
 use std::cell::RefCell;
 
-/// Points in a block: few enough that the registers stay in the first cache, and that a byte numbers a point.
-const BLOCK: usize = 256;
+/// Points in a block: few enough that most registers stay in the first cache, and so many that what an instruction costs beside its loop is little.
+const BLOCK: usize = 576;
 
 /// Registers that a thread keeps from one call to the next.
 const KEPT_REGISTERS: usize = 512;
 
 /// The values of a block, where no load of four of them crosses a line of the cache.
 #[repr(align(64))]
-struct Register([f64; BLOCK]);
+struct Register([[f64; STEP]; BLOCK / STEP]);
+
+impl Register {
+    fn new() -> Box<Register> {
+        Box::new(Register([[0.0; STEP]; BLOCK / STEP]))
+    }
+}
 
 /// Working memory, kept by each thread.
 struct Scratch {
-    #[expect(
-        clippy::vec_box,
-        reason = "registers are swapped, which is not to move their values"
-    )]
+    /// In boxes, since they are swapped, which is not to move their values.
     registers: Vec<Box<Register>>,
+    /// Coordinates and regions of a block that does not end with a step.
+    inputs: Option<[Box<Register>; 3]>,
     /// The points of the open branches, as a stack of lists.
-    points: Vec<u8>,
-    splits: Vec<Split>,
+    points: Vec<u16>,
+    splits: Vec<Parting>,
 }
 
 /// The points an instruction works on.
@@ -39,10 +44,19 @@ enum Active {
     List(usize, usize),
 }
 
+/// Which branches have points.
+#[derive(Clone, Copy, PartialEq)]
+enum Sides {
+    Both,
+    /// The first or the second alone.
+    One(usize),
+}
+
 /// A branch begun and not yet joined.
-struct Split {
+struct Parting {
     before: Active,
     other: Active,
+    sides: Sides,
     /// Length of `Scratch::points` before the split.
     mark: usize,
 }
@@ -51,120 +65,153 @@ thread_local! {
     static SCRATCH: RefCell<Scratch> = const {
         RefCell::new(Scratch {
             registers: Vec::new(),
+            inputs: None,
             points: Vec::new(),
             splits: Vec::new(),
         })
     };
 }
 
-/// Evaluates at all points; the lengths are equal, but that of `region` may be zero.
-pub(crate) fn evaluate(program: &Program, x: &[f64], y: &[f64], region: &[f64], out: &mut [f64]) {
-    if let Operand::Number(value) = program.result {
-        out.fill(value);
-        return;
-    }
+/// Evaluates at all points; the lengths are equal, but that of `region` may be zero. Returns whether all values are finite.
+pub(crate) fn evaluate<const N: usize>(
+    program: &Program,
+    x: &[f64],
+    y: &[f64],
+    region: &[f64],
+    mut out: [&mut [f64]; N],
+) -> bool {
     SCRATCH.with_borrow_mut(|scratch| {
-        // One more than the program has, see `run`.
-        while scratch.registers.len() < program.registers + 1 {
-            scratch.registers.push(Box::new(Register([0.0; BLOCK])));
+        // Two more than the program has, see `run`.
+        while scratch.registers.len() < program.registers + 2 {
+            scratch.registers.push(Register::new());
         }
         #[cfg(target_arch = "x86_64")]
         let wide = Wide::detect();
-        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
-            let range = block * BLOCK..block * BLOCK + out.len();
-            let inputs = Inputs {
-                x: &x[range.clone()],
-                y: &y[range.clone()],
-                region: if region.is_empty() {
-                    None
-                } else {
-                    Some(&region[range])
-                },
-            };
+        let mut finite = true;
+        for begin in (0..x.len()).step_by(BLOCK) {
+            let range = begin..x.len().min(begin + BLOCK);
+            let given = [
+                &x[range.clone()],
+                &y[range.clone()],
+                region.get(range.clone()).unwrap_or_default(),
+            ];
+            let mut out = out.each_mut().map(|out| &mut out[range.clone()]);
             #[cfg(target_arch = "x86_64")]
             if let Some(wide) = wide {
-                run(program, inputs, scratch, out, wide);
+                finite &= run(program, given, scratch, &mut out, wide);
                 continue;
             }
-            run(program, inputs, scratch, out, Plain);
+            finite &= run(program, given, scratch, &mut out, Plain);
         }
         scratch.registers.truncate(KEPT_REGISTERS);
-    });
+        finite
+    })
 }
 
+/// The coordinates and regions of a block, in whole steps.
 #[derive(Clone, Copy)]
 struct Inputs<'a> {
-    x: &'a [f64],
-    y: &'a [f64],
-    region: Option<&'a [f64]>,
+    x: &'a Values,
+    y: &'a Values,
+    region: &'a Values,
 }
 
+/// The regions of a block where none are given.
+static NOWHERE: [[f64; STEP]; BLOCK / STEP] = [[0.0; STEP]; BLOCK / STEP];
+
 impl<'a> Inputs<'a> {
+    /// Takes them as they are, or copied so that they fill whole steps.
+    #[inline(always)]
+    fn new(given: [&'a [f64]; 3], room: &'a mut Option<[Box<Register>; 3]>) -> Inputs<'a> {
+        let (_, rest) = given[0].as_chunks::<STEP>();
+        let [x, y, region] = if rest.is_empty() {
+            given.map(|values| values.as_chunks().0)
+        } else {
+            let room = room.get_or_insert_with(|| std::array::from_fn(|_| Register::new()));
+            let mut filled = room.iter_mut().zip(given).map(|(room, values)| {
+                let count = values.len().next_multiple_of(STEP);
+                let room = room.0.as_flattened_mut();
+                room[..values.len()].copy_from_slice(values);
+                // The last point again.
+                if let Some(last) = values.last() {
+                    room[values.len()..count].fill(*last);
+                }
+                &room.as_chunks().0[..count / STEP]
+            });
+            std::array::from_fn(|_| filled.next().unwrap_or_default())
+        };
+        let region = if region.is_empty() {
+            &NOWHERE[..x.len()]
+        } else {
+            region
+        };
+        Inputs { x, y, region }
+    }
+
+    /// The values of an operand, with what a register has beyond the steps of the block.
+    #[inline(always)]
     fn fetch(self, operand: Operand, registers: &'a [Box<Register>]) -> Source<'a> {
         match operand {
-            Operand::Register(register) => {
-                Source::Each(&registers[register as usize].0[..self.x.len()])
-            }
+            Operand::Register(register) => Source::Each(&registers[register as usize].0),
             Operand::X => Source::Each(self.x),
             Operand::Y => Source::Each(self.y),
-            Operand::Region => self.region.map_or(Source::Same(0.0), Source::Each),
+            Operand::Region => Source::Each(self.region),
             Operand::Number(value) => Source::Same(value),
         }
     }
 }
 
-/// The values of an operand over the block.
-#[derive(Clone, Copy)]
-pub(crate) enum Source<'a> {
-    Each(&'a [f64]),
-    Same(f64),
-}
-
-impl Source<'_> {
-    #[inline(always)]
-    pub(crate) fn at(self, point: usize) -> f64 {
-        match self {
-            Self::Each(values) => values[point],
-            Self::Same(value) => value,
-        }
-    }
-}
-
+/// Evaluates at the points of one block; returns whether all values are finite.
 fn run(
     program: &Program,
-    inputs: Inputs,
+    given: [&[f64]; 3],
     scratch: &mut Scratch,
-    out: &mut [f64],
+    out: &mut [&mut [f64]],
     loops: impl Loops,
-) {
-    let length = out.len();
+) -> bool {
+    let length = given[0].len();
     let Scratch {
         registers,
+        inputs,
         points,
         splits,
     } = scratch;
-    let Some((taken, registers)) = registers.split_last_mut() else {
-        return;
+    let inputs = Inputs::new(given, inputs);
+    let Some((registers, [taken, second])) = registers.split_last_chunk_mut() else {
+        return true;
     };
     points.clear();
     splits.clear();
     let mut active = Active::All;
+    if length < STEP && !program.plain {
+        // Calls for a whole step would be more work than those for the points.
+        points.extend(0..length as u16);
+        active = Active::List(0, length);
+    }
+    let mut sides = Sides::Both;
     let mut next = 0;
     while let Some(op) = program.ops.get(next) {
         next += 1;
         let target = match *op {
-            Op::Split(condition, middle) => {
-                let condition = inputs.fetch(condition, registers);
+            Op::Split(split) => {
+                let condition = inputs.fetch(split.condition, registers);
+                let condition = condition.first(inputs.x.len());
                 let mark = points.len();
-                let (then, other) = divide(condition, length, active, points, loops);
-                splits.push(Split {
+                let (then, other) = divide(condition, active, points, split.plain, loops);
+                sides = match [is_empty(then), is_empty(other)] {
+                    [true, _] => Sides::One(1),
+                    [_, true] => Sides::One(0),
+                    _ => Sides::Both,
+                };
+                splits.push(Parting {
                     before: active,
                     other,
+                    sides,
                     mark,
                 });
                 active = then;
                 if is_empty(active) {
-                    next = middle as usize;
+                    next = split.middle as usize;
                 }
                 continue;
             }
@@ -180,59 +227,79 @@ fn run(
             Op::Join => {
                 if let Some(split) = splits.pop() {
                     active = split.before;
+                    sides = split.sides;
                     points.truncate(split.mark);
                 }
                 continue;
+            }
+            Op::Pick(target, _, of) if let Sides::One(side) = sides => {
+                let Side { value, spent } = of[side];
+                if let (true, Operand::Register(register)) = (spent, value) {
+                    registers.swap(register as usize, target as usize);
+                    continue;
+                }
+                target as usize
+            }
+            Op::Both([target, other], ..) => {
+                std::mem::swap(second, &mut registers[other as usize]);
+                target as usize
             }
             Op::Unary(_, target, _)
             | Op::Binary(_, target, ..)
             | Op::Term(target, ..)
             | Op::Select(target, ..)
-            | Op::Copy(target, _) => target as usize,
+            | Op::Pick(target, ..) => target as usize,
         };
         // The target is none of the operands: swapped for one that nobody reads, it can be written while they are read.
         std::mem::swap(taken, &mut registers[target]);
-        let into = &mut taken.0[..length];
+        let into = &mut taken.0[..inputs.x.len()];
         let list = match active {
             Active::All => None,
             Active::List(start, end) => Some(&points[start..end]),
         };
+        let fetch = |operand| inputs.fetch(operand, registers);
         match *op {
-            Op::Unary(op, _, a) => loops.unary(op, into, inputs.fetch(a, registers), list),
-            Op::Binary(op, _, a, b) => {
-                loops.binary(
-                    op,
-                    into,
-                    inputs.fetch(a, registers),
-                    inputs.fetch(b, registers),
-                    list,
-                );
-            }
+            Op::Unary(op, _, a) => unary(op, into, fetch(a), list, loops),
+            Op::Binary(op, _, a, b) => binary(op, into, [fetch(a), fetch(b)], list, loops),
             Op::Term(_, term, sum) => {
-                let values = TermValues {
-                    factor: term.factor,
-                    of: inputs.fetch(term.of, registers),
-                    by: match term.by {
-                        By::Times(b) => By::Times(inputs.fetch(b, registers)),
-                        By::Over(divisor) => By::Over(divisor),
-                    },
-                    sum: sum.map(|(join, c)| (join, inputs.fetch(c, registers))),
-                };
-                loops.term(into, values, list);
+                let sum = sum.map(|(join, c)| (join, fetch(c)));
+                compute(values(term, fetch), sum, into, list, loops);
             }
-            Op::Select(_, c, a, b) => {
-                let of = [c, a, b].map(|operand| inputs.fetch(operand, registers));
-                loops.select(into, of, list);
+            Op::Both([_, target], term, sums) => {
+                let term = values(term, fetch);
+                let [c, d] = sums.map(|(minus, c)| (minus, fetch(c)));
+                let two = &mut second.0[..inputs.x.len()];
+                both([into, two], term, [c, d], list, loops);
+                std::mem::swap(second, &mut registers[target as usize]);
             }
-            Op::Copy(_, a) => map(into, inputs.fetch(a, registers), list, |a| a),
+            Op::Select(_, c, a, b) => blend(into, [fetch(c), fetch(a), fetch(b)], list, loops),
+            Op::Pick(_, c, [a, b]) => match sides {
+                Sides::Both => {
+                    blend(
+                        into,
+                        [fetch(c), fetch(a.value), fetch(b.value)],
+                        list,
+                        loops,
+                    );
+                }
+                Sides::One(side) => copy(into, fetch([a, b][side].value), list),
+            },
             Op::Split(..) | Op::Else(_) | Op::Join => {}
         }
         std::mem::swap(taken, &mut registers[target]);
     }
-    match inputs.fetch(program.result, registers) {
-        Source::Each(values) => out.copy_from_slice(values),
-        Source::Same(value) => out.fill(value),
+    let mut finite = true;
+    for (out, result) in out.iter_mut().zip(&program.results) {
+        finite &= match inputs.fetch(result.value, registers) {
+            Source::Each(values) => loops.put(out, values, result.factor),
+            Source::Same(value) => {
+                let value = value * result.factor;
+                out.fill(value);
+                value.is_finite()
+            }
+        };
     }
+    finite
 }
 
 fn is_empty(active: Active) -> bool {
@@ -240,12 +307,12 @@ fn is_empty(active: Active) -> bool {
 }
 
 /// Parts the active points by the condition. A side that gets all of them stays what they were, so that a whole block
-/// is still worked on as one.
+/// is still worked on as one; with `plain`, a whole block with points on both sides is so on both.
 fn divide(
-    condition: Source,
-    length: usize,
+    condition: Source<'_>,
     active: Active,
-    points: &mut Vec<u8>,
+    points: &mut Vec<u16>,
+    plain: bool,
     loops: impl Loops,
 ) -> (Active, Active) {
     let mark = points.len();
@@ -254,20 +321,23 @@ fn divide(
     if let (Source::Each(condition), Active::All) = (condition, active) {
         match loops.count(condition) {
             0 => return (nobody, active),
-            all if all == length => return (active, nobody),
+            all if all == STEP * condition.len() => return (active, nobody),
+            _ if plain => return (active, active),
             _ => {}
         }
     }
-    let count = match active {
-        Active::All => length,
-        Active::List(start, end) => end - start,
+    let count = match (active, condition) {
+        (Active::List(start, end), _) => end - start,
+        (Active::All, Source::Each(condition)) => STEP * condition.len(),
+        (Active::All, Source::Same(value)) if value != 0.0 => return (active, nobody),
+        (Active::All, Source::Same(_)) => return (nobody, active),
     };
     // Points where it holds from the front, the others from the back.
     points.resize(mark + count, 0);
     let (mut front, mut back) = (mark, mark + count);
     for k in 0..count {
         let point = match active {
-            Active::All => k as u8,
+            Active::All => k as u16,
             Active::List(start, _) => points[start + k],
         };
         // Written at both ends, kept at one: there is no telling which, for a processor that would guess.
@@ -284,134 +354,4 @@ fn divide(
     } else {
         (Active::List(mark, front), Active::List(back, mark + count))
     }
-}
-
-#[inline(always)]
-fn map(into: &mut [f64], a: Source, list: Option<&[u8]>, f: impl Fn(f64) -> f64) {
-    match (list, a) {
-        (None, Source::Each(a)) => {
-            for (into, a) in into.iter_mut().zip(a) {
-                *into = f(*a);
-            }
-        }
-        (None, Source::Same(a)) => into.fill(f(a)),
-        (Some(list), a) => {
-            for point in list {
-                let point = *point as usize;
-                into[point] = f(a.at(point));
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn zip(into: &mut [f64], a: Source, b: Source, list: Option<&[u8]>, f: impl Fn(f64, f64) -> f64) {
-    match (list, a, b) {
-        (None, Source::Each(a), Source::Each(b)) => {
-            for (into, (a, b)) in into.iter_mut().zip(a.iter().zip(b)) {
-                *into = f(*a, *b);
-            }
-        }
-        (None, Source::Each(a), Source::Same(b)) => {
-            for (into, a) in into.iter_mut().zip(a) {
-                *into = f(*a, b);
-            }
-        }
-        (None, Source::Same(a), Source::Each(b)) => {
-            for (into, b) in into.iter_mut().zip(b) {
-                *into = f(a, *b);
-            }
-        }
-        (None, Source::Same(a), Source::Same(b)) => into.fill(f(a, b)),
-        (Some(list), a, b) => {
-            for point in list {
-                let point = *point as usize;
-                into[point] = f(a.at(point), b.at(point));
-            }
-        }
-    }
-}
-
-/// Picks from the values where the condition, the first of the three, is true and false.
-#[inline(always)]
-pub(crate) fn choose(into: &mut [f64], [c, a, b]: [Source; 3], list: Option<&[u8]>) {
-    let Source::Each(condition) = c else {
-        let chosen = if c.at(0) != 0.0 { a } else { b };
-        return map(into, chosen, list, |value| value);
-    };
-    if let Some(list) = list {
-        for point in list {
-            let point = *point as usize;
-            into[point] = if condition[point] != 0.0 {
-                a.at(point)
-            } else {
-                b.at(point)
-            };
-        }
-        return;
-    }
-    let pairs = into.iter_mut().zip(condition);
-    match (a, b) {
-        (Source::Each(a), Source::Each(b)) => {
-            for ((into, c), (a, b)) in pairs.zip(a.iter().zip(b)) {
-                *into = if *c != 0.0 { *a } else { *b };
-            }
-        }
-        (Source::Each(a), Source::Same(b)) => {
-            for ((into, c), a) in pairs.zip(a) {
-                *into = if *c != 0.0 { *a } else { b };
-            }
-        }
-        (Source::Same(a), Source::Each(b)) => {
-            for ((into, c), b) in pairs.zip(b) {
-                *into = if *c != 0.0 { a } else { *b };
-            }
-        }
-        (Source::Same(a), Source::Same(b)) => {
-            for (into, c) in pairs {
-                *into = if *c != 0.0 { a } else { b };
-            }
-        }
-    }
-}
-
-/// How many of the values are true.
-#[inline(always)]
-pub(crate) fn count(values: &[f64]) -> usize {
-    let mut count = 0u64;
-    for value in values {
-        count += u64::from(*value != 0.0);
-    }
-    count as usize
-}
-
-#[inline(always)]
-pub(crate) fn apply_unary(op: Unary, into: &mut [f64], a: Source, list: Option<&[u8]>) {
-    // One loop for each operation, with the operation known in it.
-    macro_rules! loops {
-        ($($name:ident)*) => {
-            match op {
-                $(Unary::$name => map(into, a, list, |a| Unary::$name.apply(a)),)*
-            }
-        };
-    }
-    loops!(Neg Not Sin Cos Tan Asin Acos Atan Sinh Cosh Tanh Exp Ln Log10 Sqrt Cbrt Abs Sign Floor Ceil Step)
-}
-
-#[inline(always)]
-pub(crate) fn apply_binary(
-    op: Binary,
-    into: &mut [f64],
-    a: Source,
-    b: Source,
-    list: Option<&[u8]>,
-) {
-    macro_rules! loops {
-        ($($name:ident)*) => {
-            match op {
-                $(Binary::$name => zip(into, a, b, list, |a, b| Binary::$name.apply(a, b)),)*
-            }
-        };
-    }
-    loops!(Add Sub Mul Div Pow Lt Le Gt Ge Eq Ne And Or Min Max Hypot Atan2)
 }

@@ -1,13 +1,14 @@
 //! A formula ready for use.
 
-use crate::compile::{Program, compile};
+use crate::compile::compile;
 use crate::derive;
 use crate::error::ParseError;
 use crate::eval;
 use crate::function::Binary;
-use crate::graph::{Graph, Node, prune, renumber};
+use crate::graph::{Graph, Id, Node, prune, renumber};
 use crate::lower::lower;
 use crate::parser;
+use crate::program::Program;
 use crate::scope::Scope;
 
 /// A variable to differentiate by.
@@ -72,8 +73,8 @@ impl Expression {
     }
 
     fn build(source: String, nodes: Vec<Node>) -> Self {
-        let (graph, root): (Graph, _) = lower(&nodes);
-        let program = compile(&graph, root);
+        let (graph, roots) = lower(&nodes, &[nodes.len() - 1]);
+        let program = compile(&graph, &roots);
         Self {
             source,
             nodes,
@@ -126,34 +127,21 @@ impl Expression {
     }
 
     /// Evaluates at the points `(x[i], y[i])` of the regions `region[i]` into `out[i]`. `region` may be empty: then it
-    /// is 0 everywhere. Values that are not finite are written as they are.
+    /// is 0 everywhere. Values that are not finite are written as they are; the answer is whether all are finite.
     ///
-    /// Nothing is allocated once the thread has evaluated a formula as large; a block of 256 points is the best size.
+    /// Nothing is allocated once the thread has evaluated a formula as large; a block of 256 points is the best size, and multiples of 16 are best.
     ///
     /// # Panics
     ///
     /// When the lengths differ.
-    pub fn eval(&self, x: &[f64], y: &[f64], region: &[f64], out: &mut [f64]) {
-        assert!(
-            x.len() == out.len() && y.len() == out.len(),
-            "as many values of `x` ({}) and `y` ({}) as results ({})",
-            x.len(),
-            y.len(),
-            out.len()
-        );
-        assert!(
-            region.is_empty() || region.len() == out.len(),
-            "as many values of `region` ({}) as results ({}), or none",
-            region.len(),
-            out.len()
-        );
-        eval::evaluate(&self.program, x, y, region, out);
+    pub fn eval(&self, x: &[f64], y: &[f64], region: &[f64], out: &mut [f64]) -> bool {
+        checked(&self.program, x, y, region, [out])
     }
 
     /// The value at one point; [`Expression::eval`] gives the same bits for less work a point.
     pub fn eval_at(&self, x: f64, y: f64, region: f64) -> f64 {
         let mut out = [0.0];
-        eval::evaluate(&self.program, &[x], &[y], &[region], &mut out);
+        eval::evaluate(&self.program, &[x], &[y], &[region], [&mut out]);
         out[0]
     }
 
@@ -168,4 +156,61 @@ impl Expression {
         let nodes = derive::derivative(&self.nodes, variable.node());
         Self::build(format!("d/d{name} ({})", self.source), nodes)
     }
+}
+
+/// Several formulas that are evaluated at the same points: what they have in common is computed once.
+#[derive(Debug, Clone)]
+pub struct Joint<const N: usize> {
+    program: Program,
+}
+
+impl<const N: usize> Joint<N> {
+    /// Joins formulas.
+    pub fn new(formulas: [&Expression; N]) -> Self {
+        let mut graph = Graph::default();
+        let roots = formulas.map(|formula| {
+            let mut moved: Vec<Id> = Vec::with_capacity(formula.nodes.len());
+            for node in &formula.nodes {
+                moved.push(graph.add_node(renumber(*node, &moved)));
+            }
+            moved[moved.len() - 1].index()
+        });
+        let (graph, roots) = lower(graph.nodes(), &roots);
+        let program = compile(&graph, &roots);
+        Self { program }
+    }
+
+    /// What [`Expression::eval`] gives for each of the formulas, bit for bit; the answer is whether all values of all are finite.
+    ///
+    /// # Panics
+    ///
+    /// When the lengths differ.
+    pub fn eval(&self, x: &[f64], y: &[f64], region: &[f64], out: [&mut [f64]; N]) -> bool {
+        checked(&self.program, x, y, region, out)
+    }
+}
+
+fn checked<const N: usize>(
+    program: &Program,
+    x: &[f64],
+    y: &[f64],
+    region: &[f64],
+    out: [&mut [f64]; N],
+) -> bool {
+    for out in &out {
+        assert!(
+            x.len() == out.len() && y.len() == out.len(),
+            "as many values of `x` ({}) and `y` ({}) as results ({})",
+            x.len(),
+            y.len(),
+            out.len()
+        );
+    }
+    assert!(
+        region.is_empty() || region.len() == x.len(),
+        "as many values of `region` ({}) as results ({}), or none",
+        region.len(),
+        x.len()
+    );
+    eval::evaluate(program, x, y, region, out)
 }

@@ -49,21 +49,25 @@
 
 mod compile;
 mod derive;
+mod dispatch;
 mod error;
 mod eval;
 mod expression;
 mod function;
 mod graph;
+mod loops;
 mod lower;
 mod names;
 mod parser;
+mod program;
 mod quotient;
 mod registers;
 mod scope;
+mod share;
 mod term;
 mod token;
 mod wide;
 
 pub use error::{ParseError, ScopeError};
-pub use expression::{Expression, Variable};
+pub use expression::{Expression, Joint, Variable};
 pub use scope::Scope;

@@ -5,8 +5,8 @@ use crate::function::{Binary, integer_exponent, integer_power};
 use crate::graph::{Graph, Id, Node, renumber};
 use crate::quotient::exact_reciprocal;
 
-/// The graph to compile, and its root. `nodes` ends with its root.
-pub(crate) fn lower(nodes: &[Node]) -> (Graph, Id) {
+/// The graph to compile, and its roots; `roots` are the places of those in `nodes`.
+pub(crate) fn lower(nodes: &[Node], roots: &[usize]) -> (Graph, Vec<Id>) {
     let mut graph = Graph::default();
     let mut moved: Vec<Id> = Vec::with_capacity(nodes.len());
     for node in nodes {
@@ -25,11 +25,8 @@ pub(crate) fn lower(nodes: &[Node]) -> (Graph, Id) {
         };
         moved.push(id);
     }
-    let root = match moved.last() {
-        Some(root) => *root,
-        None => graph.number(0.0),
-    };
-    (graph, root)
+    let roots = roots.iter().map(|root| moved[*root]).collect();
+    (graph, roots)
 }
 
 fn quotient(graph: &mut Graph, a: Id, b: Id) -> Id {

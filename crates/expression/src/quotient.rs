@@ -22,9 +22,10 @@ pub(crate) struct Divisor {
     low: f64,
 }
 
-/// Bits of the first number that is too small to be divided by products, 2^-512, and of all there are from it to 2^512.
+/// Bits of the smallest size that is divided by products, 2^-512. From there to 2^512 there are 2^62 numbers, so that the difference of a number's bits
+/// and these has a bit 62 if and only if it is not among them; the sign is bit 63.
 const SMALLEST: u64 = (1023 - 512) << 52;
-const RANGE: u32 = 62;
+const OUTSIDE: u64 = 1 << 62;
 
 impl Divisor {
     /// None of a constant that products do not serve.
@@ -44,13 +45,13 @@ impl Divisor {
     /// x/c by fused products. `outside` gathers for [`Self::is_outside`] whether some x had to be divided instead.
     #[inline(always)]
     pub(crate) fn quotient(self, x: f64, outside: &mut u64) -> f64 {
-        *outside |= x.abs().to_bits().wrapping_sub(SMALLEST);
+        *outside |= x.to_bits().wrapping_sub(SMALLEST);
         x.mul_add(self.high, x * self.low)
     }
 
     #[inline(always)]
     pub(crate) fn is_outside(outside: u64) -> bool {
-        outside >> RANGE != 0
+        outside & OUTSIDE != 0
     }
 }
 

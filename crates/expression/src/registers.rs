@@ -1,41 +1,11 @@
 //! Which register holds which value of a compiled formula.
 
-use crate::compile::{Op, Operand, Program};
-use crate::term::By;
-
-impl Op {
-    pub(crate) fn operands_mut(&mut self) -> impl Iterator<Item = &mut Operand> {
-        let list = match self {
-            Self::Unary(_, _, a) | Self::Copy(_, a) | Self::Split(a, _) => [Some(a), None, None],
-            Self::Binary(_, _, a, b) => [Some(a), Some(b), None],
-            Self::Select(_, c, a, b) => [Some(c), Some(a), Some(b)],
-            Self::Term(_, term, sum) => {
-                let by = match &mut term.by {
-                    By::Times(b) => Some(b),
-                    By::Over(_) => None,
-                };
-                [Some(&mut term.of), by, sum.as_mut().map(|(_, c)| c)]
-            }
-            Self::Else(_) | Self::Join => [None, None, None],
-        };
-        list.into_iter().flatten()
-    }
-
-    pub(crate) fn target_mut(&mut self) -> Option<&mut u32> {
-        match self {
-            Self::Unary(_, t, _)
-            | Self::Binary(_, t, ..)
-            | Self::Term(t, ..)
-            | Self::Select(t, ..)
-            | Self::Copy(t, _) => Some(t),
-            Self::Split(..) | Self::Else(_) | Self::Join => None,
-        }
-    }
-}
+use crate::program::{Op, Operand, Outcome, Program};
 
 /// Gives each value a register from its first computation to its last use in the list. The order of the list is
-/// enough: a register freed in one branch and used again in the other is written at other points.
-pub(crate) fn allocate(mut ops: Vec<Op>, virtuals: usize, mut result: Operand) -> Program {
+/// enough: what one branch ends with is used by the `Pick` after the other, and what else it computes has no use there.
+pub(crate) fn allocate(mut ops: Vec<Op>, virtuals: usize, mut results: Vec<Outcome>) -> Program {
+    link(&mut ops);
     let mut last_use = vec![0usize; virtuals];
     for (place, op) in ops.iter_mut().enumerate() {
         for operand in op.operands_mut() {
@@ -44,14 +14,16 @@ pub(crate) fn allocate(mut ops: Vec<Op>, virtuals: usize, mut result: Operand) -
             }
         }
     }
-    if let Operand::Register(register) = result {
-        last_use[register as usize] = ops.len();
+    for result in &results {
+        if let Operand::Register(register) = &result.value {
+            last_use[*register as usize] = ops.len();
+        }
     }
     let mut given: Vec<Option<u32>> = vec![None; virtuals];
     let mut free: Vec<u32> = Vec::new();
     let mut registers = 0u32;
     for (place, op) in ops.iter_mut().enumerate() {
-        if let Some(target) = op.target_mut() {
+        for target in op.targets_mut() {
             let register = given[*target as usize].get_or_insert_with(|| {
                 free.pop().unwrap_or_else(|| {
                     registers += 1;
@@ -59,6 +31,14 @@ pub(crate) fn allocate(mut ops: Vec<Op>, virtuals: usize, mut result: Operand) -
                 })
             });
             *target = *register;
+        }
+        if let Op::Pick(_, _, sides) = op {
+            for side in sides {
+                side.spent = match side.value {
+                    Operand::Register(register) => last_use[register as usize] == place,
+                    _ => false,
+                };
+            }
         }
         for operand in op.operands_mut() {
             if let Operand::Register(register) = operand {
@@ -73,12 +53,38 @@ pub(crate) fn allocate(mut ops: Vec<Op>, virtuals: usize, mut result: Operand) -
             }
         }
     }
-    if let Operand::Register(register) = &mut result {
-        *register = given[*register as usize].expect("the result is computed");
+    for result in &mut results {
+        if let Operand::Register(register) = &mut result.value {
+            *register = given[*register as usize].expect("the result is computed");
+        }
     }
     Program {
+        plain: ops.iter().all(Op::is_plain),
         ops,
         registers: registers as usize,
-        result,
+        results,
+    }
+}
+
+/// Makes the jumps of every `Split` and `Else` lead to where its branch ends.
+fn link(ops: &mut [Op]) {
+    let mut open = Vec::new();
+    for place in 0..ops.len() {
+        match ops[place] {
+            Op::Split(_) => open.push(place),
+            Op::Else(_) | Op::Join => {
+                if let Some(begin) = open.pop() {
+                    match &mut ops[begin] {
+                        Op::Split(split) => split.middle = place as u32,
+                        Op::Else(end) => *end = place as u32,
+                        _ => {}
+                    }
+                }
+                if matches!(ops[place], Op::Else(_)) {
+                    open.push(place);
+                }
+            }
+            _ => {}
+        }
     }
 }

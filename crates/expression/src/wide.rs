@@ -3,158 +3,100 @@
 //!
 //! Both do the same IEEE operations on every point, and products and sums of the formula are never fused, so that they give the same bits.
 
-use crate::eval::{Source, apply_binary, apply_unary, choose, count};
+#![allow(
+    clippy::too_many_arguments,
+    reason = "what overlaps nothing is known of arguments by themselves, not of what a structure holds"
+)]
+
 use crate::function::{Binary, Unary};
-use crate::term::TermValues;
+use crate::loops::{self, Source, Values};
+use crate::quotient::Divisor;
+use crate::term::Sum;
 
-/// The loops of the instructions; `list` holds the points to work on, all of them if there is none.
-pub(crate) trait Loops: Copy {
-    fn unary(self, op: Unary, into: &mut [f64], a: Source<'_>, list: Option<&[u8]>);
+/// Writes down the loops of [`crate::loops`], once for each of the two.
+macro_rules! loops {
+    ($($name:ident($($argument:ident: $type:ty),*) $(-> $result:ty)?;)*) => {
+        /// The loops of the instructions.
+        pub(crate) trait Loops: Copy {
+            $(fn $name(self, $($argument: $type),*) $(-> $result)?;)*
+        }
 
-    fn binary(
-        self,
-        op: Binary,
-        into: &mut [f64],
-        a: Source<'_>,
-        b: Source<'_>,
-        list: Option<&[u8]>,
-    );
+        /// What every processor of the target can do.
+        #[derive(Clone, Copy)]
+        pub(crate) struct Plain;
 
-    /// How many of the values are true.
-    fn count(self, values: &[f64]) -> usize;
+        impl Loops for Plain {
+            $(fn $name(self, $($argument: $type),*) $(-> $result)? {
+                // Without an instruction for it, a fused operation is slower than a division.
+                loops::$name::<false>($($argument),*)
+            })*
+        }
 
-    fn term(self, into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>);
+        #[cfg(target_arch = "x86_64")]
+        #[allow(
+            unsafe_code,
+            reason = "functions for AVX2 and FMA are called: a `Wide` exists only where the processor was found to have it"
+        )]
+        mod x86 {
+            use super::{Binary, Divisor, Loops, Source, Sum, Unary, Values};
 
-    /// `of` holds the condition and the values where it is true and false.
-    fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>);
-}
+            /// The proof that the processor has AVX2 and FMA; made by [`Wide::detect`] alone.
+            #[derive(Clone, Copy)]
+            pub(crate) struct Wide(());
 
-/// What every processor of the target can do.
-#[derive(Clone, Copy)]
-pub(crate) struct Plain;
+            impl Wide {
+                /// Asks the processor; the answer is kept by the standard library.
+                #[inline]
+                pub(crate) fn detect() -> Option<Wide> {
+                    (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"))
+                        .then_some(Wide(()))
+                }
+            }
 
-impl Loops for Plain {
-    fn unary(self, op: Unary, into: &mut [f64], a: Source<'_>, list: Option<&[u8]>) {
-        apply_unary(op, into, a, list);
-    }
+            impl Loops for Wide {
+                $(#[inline(always)]
+                fn $name(self, $($argument: $type),*) $(-> $result)? {
+                    // SAFETY: the processor has both, or there were no `self`.
+                    unsafe { wide::$name($($argument),*) }
+                })*
+            }
 
-    fn binary(
-        self,
-        op: Binary,
-        into: &mut [f64],
-        a: Source<'_>,
-        b: Source<'_>,
-        list: Option<&[u8]>,
-    ) {
-        apply_binary(op, into, a, b, list);
-    }
+            mod wide {
+                use super::{Binary, Divisor, Source, Sum, Unary, Values};
+                use crate::loops;
 
-    fn count(self, values: &[f64]) -> usize {
-        count(values)
-    }
-
-    // Without an instruction for it, a fused operation is slower than a division.
-    fn term(self, into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>) {
-        term.compute(into, list, false);
-    }
-
-    fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
-        choose(into, of, list);
-    }
+                $(#[target_feature(enable = "avx2,fma")]
+                pub(super) fn $name($($argument: $type),*) $(-> $result)? {
+                    loops::$name::<true>($($argument),*)
+                })*
+            }
+        }
+    };
 }
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use x86::Wide;
 
-#[cfg(target_arch = "x86_64")]
-#[allow(
-    unsafe_code,
-    reason = "functions for AVX2 and FMA are called: a `Wide` exists only where the processor was found to have it"
-)]
-mod x86 {
-    use super::{
-        Binary, Loops, Source, TermValues, Unary, apply_binary, apply_unary, choose,
-        count as count_true,
-    };
-
-    /// The proof that the processor has AVX2 and FMA; made by [`Wide::detect`] alone.
-    #[derive(Clone, Copy)]
-    pub(crate) struct Wide(());
-
-    impl Wide {
-        /// Asks the processor; the answer is kept by the standard library.
-        #[inline]
-        pub(crate) fn detect() -> Option<Wide> {
-            (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"))
-                .then_some(Wide(()))
-        }
-    }
-
-    impl Loops for Wide {
-        fn unary(self, op: Unary, into: &mut [f64], a: Source<'_>, list: Option<&[u8]>) {
-            // SAFETY: the processor has both, or there were no `self`.
-            unsafe { unary(op, into, a, list) }
-        }
-
-        fn binary(
-            self,
-            op: Binary,
-            into: &mut [f64],
-            a: Source<'_>,
-            b: Source<'_>,
-            list: Option<&[u8]>,
-        ) {
-            // SAFETY: the processor has both, or there were no `self`.
-            unsafe { binary(op, into, a, b, list) }
-        }
-
-        fn count(self, values: &[f64]) -> usize {
-            // SAFETY: the processor has both, or there were no `self`.
-            unsafe { count(values) }
-        }
-
-        fn term(self, into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>) {
-            // SAFETY: the processor has both, or there were no `self`.
-            unsafe { compute(into, term, list) }
-        }
-
-        fn select(self, into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
-            // SAFETY: the processor has both, or there were no `self`.
-            unsafe { select(into, of, list) }
-        }
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    fn unary(op: Unary, into: &mut [f64], a: Source<'_>, list: Option<&[u8]>) {
-        apply_unary(op, into, a, list);
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    fn binary(op: Binary, into: &mut [f64], a: Source<'_>, b: Source<'_>, list: Option<&[u8]>) {
-        apply_binary(op, into, a, b, list);
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    fn count(values: &[f64]) -> usize {
-        count_true(values)
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    fn compute(into: &mut [f64], term: TermValues<'_>, list: Option<&[u8]>) {
-        term.compute(into, list, true);
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    fn select(into: &mut [f64], of: [Source<'_>; 3], list: Option<&[u8]>) {
-        choose(into, of, list);
-    }
+loops! {
+    unary(op: Unary, into: &mut Values, a: &Values);
+    binary(op: Binary, into: &mut Values, a: &Values, b: &Values);
+    binary_with(op: Binary, into: &mut Values, a: &Values, number: f64, place: usize);
+    products(into: &mut Values, factor: f64, a: &Values, b: &Values, sum: Sum, c: &Values);
+    multiples(into: &mut Values, factor: [f64; 2], a: &Values, sum: Sum, c: &Values);
+    quotients(into: &mut Values, factor: f64, a: &Values, divisor: Divisor, sum: Sum, c: &Values);
+    both_products(one: &mut Values, two: &mut Values, factor: f64, a: &Values, b: &Values, minus: [bool; 2], c: &Values, d: &Values);
+    both_multiples(one: &mut Values, two: &mut Values, factor: [f64; 2], a: &Values, minus: [bool; 2], c: &Values, d: &Values);
+    both_quotients(one: &mut Values, two: &mut Values, factor: f64, a: &Values, divisor: Divisor, minus: [bool; 2], c: &Values, d: &Values);
+    blend(into: &mut Values, c: &Values, a: Source<'_>, b: Source<'_>);
+    count(values: &Values) -> usize;
+    put(out: &mut [f64], values: &Values, factor: f64) -> bool;
 }
 
 #[cfg(all(test, target_arch = "x86_64"))]
 mod tests {
     use super::*;
-    use crate::quotient::Divisor;
-    use crate::term::{By, Join};
+    use crate::loops::STEP;
+    use crate::term::Join;
 
     const UNARY: [Unary; 21] = {
         use Unary::*;
@@ -172,38 +114,52 @@ mod tests {
     };
 
     /// Numbers of all kinds, the same number often.
-    fn numbers(seed: u64) -> Vec<f64> {
+    fn numbers(seed: u64) -> [[f64; STEP]; 9] {
         let special = [0.0, -0.0, 1.0, -1.5, f64::NAN, f64::INFINITY, 1e-310, 3e200];
         let mut state = seed;
-        (0..253)
-            .map(|_| {
-                state = state
-                    .wrapping_mul(6364136223846793005)
-                    .wrapping_add(1442695040888963407);
-                match state >> 60 {
-                    0..4 => special[(state >> 50) as usize % special.len()],
-                    _ => (state >> 40) as f64 / 4e6 - 2.0,
-                }
-            })
-            .collect()
+        let mut next = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            match state >> 60 {
+                0..4 => special[(state >> 50) as usize % special.len()],
+                _ => (state >> 40) as f64 / 4e6 - 2.0,
+            }
+        };
+        // All numbers of the last step may be divided by products.
+        let mut numbers: [[f64; STEP]; 9] =
+            std::array::from_fn(|_| std::array::from_fn(|_| next()));
+        numbers[8] = std::array::from_fn(|k| 0.3 + k as f64);
+        numbers
+    }
+
+    /// Whether two loops give the same bits; which NaN it is means nothing.
+    fn compare(steps: usize, what: &str, plain: impl Fn(&mut Values), wide: impl Fn(&mut Values)) {
+        let mut out = [[[0.0; STEP]; 9]; 2];
+        plain(&mut out[0][..steps]);
+        wide(&mut out[1][..steps]);
+        let bits = |values: &Values| -> Vec<Option<u64>> {
+            let values = values.as_flattened().iter();
+            values
+                .map(|x| (!x.is_nan()).then_some(x.to_bits()))
+                .collect()
+        };
+        assert_eq!(bits(&out[0]), bits(&out[1]), "{what} of {steps} steps");
     }
 
     /// A term by the operations that it is made of.
-    fn one_by_one(term: TermValues<'_>, into: &mut [f64], list: Option<&[u8]>) {
-        let [mut scaled, mut product] = [vec![0.0; into.len()], vec![0.0; into.len()]];
-        let factor = Source::Same(term.factor);
-        Plain.binary(Binary::Mul, &mut scaled, factor, term.of, None);
-        let (op, by) = match term.by {
-            By::Times(b) => (Binary::Mul, b),
-            By::Over(divisor) => (Binary::Div, Source::Same(divisor.value)),
-        };
-        Plain.binary(op, &mut product, Source::Each(&scaled), by, None);
-        let t = Source::Each(&product);
-        match term.sum {
-            None => Plain.binary(Binary::Mul, into, t, Source::Same(1.0), list),
-            Some((Join::Plus, c)) => Plain.binary(Binary::Add, into, t, c, list),
-            Some((Join::Minus, c)) => Plain.binary(Binary::Sub, into, t, c, list),
-            Some((Join::From, c)) => Plain.binary(Binary::Sub, into, c, t, list),
+    fn one_by_one(into: &mut Values, term: impl Fn(&mut Values), sum: Sum, c: &Values) {
+        let mut t = [[0.0; STEP]; 9];
+        let t = &mut t[..into.len()];
+        term(t);
+        match sum {
+            Sum::Nothing => into.copy_from_slice(t),
+            Sum::Each(Join::Plus) => Plain.binary(Binary::Add, into, t, c),
+            Sum::Each(Join::Minus) => Plain.binary(Binary::Sub, into, t, c),
+            Sum::Each(Join::From) => Plain.binary(Binary::Sub, into, c, t),
+            Sum::Same(Join::Plus, c) => Plain.binary_with(Binary::Add, into, t, c, 1),
+            Sum::Same(Join::Minus, c) => Plain.binary_with(Binary::Sub, into, t, c, 1),
+            Sum::Same(Join::From, c) => Plain.binary_with(Binary::Sub, into, t, c, 0),
         }
     }
 
@@ -213,69 +169,158 @@ mod tests {
             return;
         };
         let [a, b, c] = [1, 2, 3].map(numbers);
-        let sources = |v| [Source::Each(v), Source::Same(0.3)];
-        let list: Vec<u8> = (0..253).filter(|k| k % 3 != 1).collect();
-        // Which NaN it is means nothing.
-        let bits = |v: &[f64]| -> Vec<Option<u64>> {
-            v.iter()
-                .map(|x| (!x.is_nan()).then_some(x.to_bits()))
-                .collect()
-        };
-        for list in [None, Some(&list[..])] {
-            let same = |plain: &dyn Fn(&mut [f64]), wide: &dyn Fn(&mut [f64]), what: String| {
-                let mut out = [vec![0.0; 253], vec![0.0; 253]];
-                plain(&mut out[0]);
-                wide(&mut out[1]);
-                assert_eq!(bits(&out[0]), bits(&out[1]), "{what}");
-            };
+        for steps in [1, 2, 9] {
             for op in UNARY {
-                same(
-                    &|out| Plain.unary(op, out, Source::Each(&a), list),
-                    &|out| wide.unary(op, out, Source::Each(&a), list),
-                    format!("{op:?}"),
+                compare(
+                    steps,
+                    &format!("{op:?}"),
+                    |out| Plain.unary(op, out, &a),
+                    |out| wide.unary(op, out, &a),
                 );
             }
-            for (p, q) in sources(&a)
-                .into_iter()
-                .flat_map(|p| sources(&b).map(|q| (p, q)))
-            {
-                for op in BINARY {
-                    same(
-                        &|out| Plain.binary(op, out, p, q, list),
-                        &|out| wide.binary(op, out, p, q, list),
-                        format!("{op:?}"),
-                    );
-                }
-                let by = [3.0, -0.75, 12.0].map(|value| By::Over(Divisor::new(value).unwrap()));
-                let joins = [Join::Plus, Join::Minus, Join::From].into_iter();
-                let sums = joins.flat_map(|join| sources(&c).map(|c| Some((join, c))));
-                for (by, sum) in by
-                    .into_iter()
-                    .chain([By::Times(q)])
-                    .flat_map(|by| sums.clone().chain([None]).map(move |sum| (by, sum)))
-                {
-                    let term = TermValues {
-                        factor: if sum.is_none() { 1.0 } else { 0.7 },
-                        of: p,
-                        by,
-                        sum,
-                    };
-                    same(
-                        &|out| one_by_one(term, out, list),
-                        &|out| wide.term(out, term, list),
-                        "term".into(),
-                    );
-                    same(
-                        &|out| one_by_one(term, out, list),
-                        &|out| Plain.term(out, term, list),
-                        "term".into(),
-                    );
-                }
-                same(
-                    &|out| Plain.select(out, [Source::Each(&c), p, q], list),
-                    &|out| wide.select(out, [Source::Each(&c), p, q], list),
-                    "select".into(),
+            for op in BINARY {
+                compare(
+                    steps,
+                    &format!("{op:?}"),
+                    |out| Plain.binary(op, out, &a, &b),
+                    |out| wide.binary(op, out, &a, &b),
                 );
+                for place in [0, 1] {
+                    compare(
+                        steps,
+                        &format!("{op:?} with a number as {place}"),
+                        |out| Plain.binary_with(op, out, &a, 0.3, place),
+                        |out| wide.binary_with(op, out, &a, 0.3, place),
+                    );
+                }
+            }
+            for [a, b] in [[&a[..], &b[..]], [&a, &a]] {
+                let sources = |v| [Source::Each(v), Source::Same(0.3)];
+                let pairs = sources(a)
+                    .into_iter()
+                    .flat_map(|p| sources(b).map(|q| [p, q]));
+                for [p, q] in pairs {
+                    compare(
+                        steps,
+                        "blend",
+                        |out| Plain.blend(out, &c, p, q),
+                        |out| wide.blend(out, &c, p, q),
+                    );
+                }
+            }
+            assert_eq!(Plain.count(&a[..steps]), wide.count(&a[..steps]));
+        }
+    }
+
+    #[test]
+    fn terms_are_their_operations_one_by_one() {
+        let wide = Wide::detect();
+        let [a, b, c] = [1, 2, 3].map(numbers);
+        let last = numbers(4)[8];
+        let joins = [Join::Plus, Join::Minus, Join::From];
+        let sums = joins
+            .into_iter()
+            .flat_map(|join| [Sum::Each(join), Sum::Same(join, 0.3)])
+            .chain([Sum::Nothing]);
+        let scaled = |factor: f64, a: &Values| {
+            let mut out = [[0.0; STEP]; 9];
+            Plain.binary_with(Binary::Mul, &mut out[..a.len()], a, factor, 0);
+            out
+        };
+        for sum in sums {
+            for (a, factor) in [(&a[..], 0.7), (&a, 1.0), (&[last], 3.0)] {
+                let n = a.len();
+                let first = scaled(factor, a);
+                let product = |t: &mut Values| Plain.binary(Binary::Mul, t, &first, &b);
+                let multiple = |t: &mut Values| Plain.binary_with(Binary::Mul, t, &first, 0.9, 1);
+                let what = format!("{sum:?}");
+                compare(
+                    n,
+                    &what,
+                    |out| one_by_one(out, product, sum, &c),
+                    |out| {
+                        Plain.products(out, factor, a, &b, sum, &c);
+                    },
+                );
+                compare(
+                    n,
+                    &what,
+                    |out| one_by_one(out, multiple, sum, &c),
+                    |out| {
+                        Plain.multiples(out, [factor, 0.9], a, sum, &c);
+                    },
+                );
+                if let Some(wide) = wide {
+                    compare(
+                        n,
+                        &what,
+                        |out| one_by_one(out, product, sum, &c),
+                        |out| {
+                            wide.products(out, factor, a, &b, sum, &c);
+                        },
+                    );
+                    compare(
+                        n,
+                        &what,
+                        |out| one_by_one(out, multiple, sum, &c),
+                        |out| {
+                            wide.multiples(out, [factor, 0.9], a, sum, &c);
+                        },
+                    );
+                }
+                for divisor in [3.0, -0.75, 12.0].map(|value| Divisor::new(value).unwrap()) {
+                    let quotient = |t: &mut Values| {
+                        Plain.binary_with(Binary::Div, t, &first, divisor.value, 1);
+                    };
+                    compare(
+                        n,
+                        &what,
+                        |out| one_by_one(out, quotient, sum, &c),
+                        |out| {
+                            Plain.quotients(out, factor, a, divisor, sum, &c);
+                        },
+                    );
+                    if let Some(wide) = wide {
+                        compare(
+                            n,
+                            &what,
+                            |out| one_by_one(out, quotient, sum, &c),
+                            |out| {
+                                wide.quotients(out, factor, a, divisor, sum, &c);
+                            },
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn results_are_products_and_judged() {
+        let Some(wide) = Wide::detect() else {
+            return;
+        };
+        let finite = [[0.75; STEP]; 3];
+        for length in [33, 40, 48] {
+            for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX] {
+                for at in [None, Some(0), Some(31), Some(length - 1)] {
+                    let mut values = finite;
+                    if let Some(at) = at {
+                        values[at / STEP][at % STEP] = wrong;
+                    }
+                    let mut out = [[0.0; 48]; 2];
+                    let [plain, other] = &mut out;
+                    let judged = [
+                        Plain.put(&mut plain[..length], &values, 2.0),
+                        wide.put(&mut other[..length], &values, 2.0),
+                    ];
+                    assert_eq!(judged, [at.is_none(); 2], "{wrong} at {at:?}");
+                    for out in out {
+                        for (k, value) in out[..length].iter().enumerate() {
+                            assert!(*value == 1.5 || Some(k) == at);
+                        }
+                    }
+                }
             }
         }
     }

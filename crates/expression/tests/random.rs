@@ -1,6 +1,6 @@
 //! Random formulas: printed, parsed and evaluated in batches, against an interpreter that walks the tree.
 
-use expression::{Expression, Scope};
+use expression::{Expression, Joint, Scope};
 use proptest::prelude::*;
 
 #[derive(Debug, Clone)]
@@ -214,7 +214,7 @@ fn tree() -> impl Strategy<Value = Tree> {
     })
 }
 
-/// 300 points, so that a second block is begun, with awkward values among them.
+/// 600 points, so that a second block is begun, with awkward values among them.
 fn points() -> Vec<[f64; 3]> {
     let awkward = [
         0.0,
@@ -227,7 +227,7 @@ fn points() -> Vec<[f64; 3]> {
         f64::NAN,
         5e-324,
     ];
-    (0..300usize)
+    (0..600usize)
         .map(|k| {
             let spread = |ratio: f64| 4.0 * (k as f64 * ratio).fract() - 2.0;
             let (mut x, mut y) = (spread(0.754_877), spread(0.569_84));
@@ -267,6 +267,45 @@ proptest! {
         if let Some(constant) = expression.constant() {
             let walked = interpret(&tree, [0.3, 0.4, 1.0]);
             prop_assert!(constant == walked || (constant.is_nan() && walked.is_nan()), "{source}: {constant}");
+        }
+    }
+
+    #[test]
+    fn joined_formulas_give_the_bits_of_each(trees in (tree(), tree(), tree(), tree(), tree()), one in any::<bool>()) {
+        // The same condition in both, and parts in common.
+        let (c, a, b, d, e) = trees;
+        let choice = |c: &Tree, a: Tree, b: Tree| Call("if", vec![c.clone(), a, b]);
+        let sum = |a: &Tree, b: &Tree| Infix(Box::new(a.clone()), "+", Box::new(b.clone()));
+        let first = choice(&c, sum(&a, &d), sum(&b, &c));
+        let second = if one {
+            sum(&a, &choice(&c, choice(&d, a.clone(), b.clone()), e.clone()))
+        } else {
+            choice(&c, sum(&d, &a), e.clone())
+        };
+        let sources = [&first, &second, &d].map(print);
+        let parsed = sources.each_ref().map(|source| Expression::parse(source, &Scope::new()));
+        let [Ok(first), Ok(second), Ok(third)] = parsed else {
+            panic!("{sources:?}");
+        };
+        let points = points();
+        // Points in order, and points that are nearly alike.
+        for (range, stretch) in [(0..600, 1.0), (3..4, 1.0), (10..43, 1e-3)] {
+            let [x, y, region] = [0, 1, 2].map(|k| {
+                points[range.clone()].iter().map(|point| 0.4 + stretch * point[k]).collect::<Vec<_>>()
+            });
+            let mut together = [0, 1, 2].map(|_| vec![7e77; x.len()]);
+            let joint = Joint::new([&first, &second, &third]);
+            let finite = joint.eval(&x, &y, &region, together.each_mut().map(|out| &mut out[..]));
+            prop_assert_eq!(finite, together.iter().flatten().all(|value| value.is_finite()));
+            for ((own, expression), source) in together.iter().zip([&first, &second, &third]).zip(&sources) {
+                let mut alone = vec![7e77; x.len()];
+                let finite = expression.eval(&x, &y, &region, &mut alone);
+                prop_assert_eq!(finite, alone.iter().all(|value| value.is_finite()));
+                for (k, (one, two)) in own.iter().zip(&alone).enumerate() {
+                    let same = one.to_bits() == two.to_bits() || (one.is_nan() && two.is_nan());
+                    prop_assert!(same, "{source} at {} {}: {one} joined with {sources:?}, {two} alone", x[k], y[k]);
+                }
+            }
         }
     }
 }

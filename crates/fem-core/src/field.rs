@@ -49,6 +49,58 @@ pub trait Field: Send + Sync {
     fn constant(&self) -> Option<f64> {
         None
     }
+
+    /// What samples this field and another one together, and which of the two it is, 0 or 1; none where that saves nothing.
+    fn joint(&self) -> Option<(&dyn JointFields, usize)> {
+        None
+    }
+}
+
+/// Two fields with work in common.
+pub trait JointFields: Send + Sync {
+    /// Writes the values at `at` that [`Field::sample`] gives for the one and the other, bit for bit.
+    ///
+    /// # Errors
+    /// The first value of the first field that is not finite, or else of the second.
+    fn sample(&self, at: Samples<'_>, out: [&mut [f64]; 2]) -> Result<(), FieldError>;
+}
+
+/// Two fields to be sampled at the same points, together if they are made for that.
+#[derive(Clone, Copy)]
+pub struct FieldPair<'a> {
+    fields: [&'a dyn Field; 2],
+    joint: Option<&'a dyn JointFields>,
+}
+
+impl<'a> FieldPair<'a> {
+    /// The pair of these fields.
+    pub fn new(fields: [&'a dyn Field; 2]) -> Self {
+        let joint = match fields.map(|field| field.joint()) {
+            [Some((first, 0)), Some((second, 1))] if std::ptr::addr_eq(first, second) => {
+                Some(first)
+            }
+            _ => None,
+        };
+        FieldPair { fields, joint }
+    }
+
+    /// Writes the values of both at `at`, all finite.
+    ///
+    /// # Errors
+    /// The first value of the first field that is not finite, or else of the second.
+    pub fn sample(
+        &self,
+        at: Samples<'_>,
+        [first, second]: [&mut [f64]; 2],
+    ) -> Result<(), FieldError> {
+        match self.joint {
+            Some(joint) => joint.sample(at, [first, second]),
+            None => {
+                self.fields[0].sample(at, first)?;
+                self.fields[1].sample(at, second)
+            }
+        }
+    }
 }
 
 /// A field that has one value everywhere.

@@ -35,7 +35,7 @@ pub mod values;
 
 pub use bisect::{Children, Refinement};
 pub use error::MeshError;
-pub use field::{Constant, Field, FieldError, Samples};
+pub use field::{Constant, Field, FieldError, FieldPair, JointFields, Samples};
 pub use index::{TriangleId, VertexId};
 pub use mesh::{Circle, Mesh, Shape};
 pub use scale::Scale;

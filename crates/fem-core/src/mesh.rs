@@ -102,6 +102,7 @@ pub struct Mesh {
 impl Deref for Mesh {
     type Target = Topology;
 
+    #[inline]
     fn deref(&self) -> &Topology {
         &self.topology
     }

@@ -90,6 +90,31 @@ pub fn affine_misfit(rule: &[RulePoint; POINTS], values: &[f64]) -> f64 {
     affine_fit(rule, values).misfit
 }
 
+/// [`affine_misfit`] of several functions, bit for bit.
+pub fn affine_misfits<const N: usize>(rule: &[RulePoint; POINTS], values: [&[f64]; N]) -> [f64; N] {
+    let samples: [[f64; N]; POINTS] = std::array::from_fn(|q| values.map(|values| values[q]));
+    let (mut mean, mut slope) = ([0.0; N], [[0.0; N]; 3]);
+    for (p, v) in rule.iter().zip(&samples) {
+        let factors = p.at.map(|at| p.weight * (at - 1.0 / 3.0));
+        for l in 0..N {
+            let d = v[l] - samples[0][l];
+            mean[l] += p.weight * d;
+            for k in 0..3 {
+                slope[k][l] += factors[k] * d;
+            }
+        }
+    }
+    let mut misfit = [0.0f64; N];
+    for (p, v) in rule.iter().zip(&samples) {
+        for l in 0..N {
+            let [a, b, c] = [0, 1, 2].map(|k| slope[k][l] * p.at[k]);
+            let off = (v[l] - samples[0][l] - (mean[l] + 12.0 * (a + b + c))).abs();
+            misfit[l] = misfit[l].max(off);
+        }
+    }
+    misfit
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -116,6 +141,18 @@ mod tests {
         }
         assert!(error(6, 0) > 1e-5);
         assert!(rule().iter().all(|p| p.at.iter().all(|&l| l > 0.05)));
+    }
+
+    #[test]
+    fn several_misfits_are_those_of_each() {
+        let r = rule();
+        let at = |f: &dyn Fn([f64; 3]) -> f64| r.map(|p| f(p.at));
+        let [a, b] = [
+            at(&|l| (3.1 * l[0] + l[1]).sin()),
+            at(&|l| f64::from(l[0] > 0.4) - 7.3),
+        ];
+        let single = [&a, &b].map(|values| affine_misfit(&r, values));
+        assert_eq!(affine_misfits(&r, [&a, &b]), single);
     }
 
     #[test]

@@ -165,7 +165,8 @@ pub(crate) fn scene(
         tension: [0, 1].map(|i| -> Arc<dyn Field> {
             Arc::new(field(&checked.tension[i], scale.tension).positive())
         }),
-        load: [0, 1].map(|i| -> Arc<dyn Field> { Arc::new(field(&checked.load[i], scale.load)) }),
+        load: ExpressionField::pair([0, 1].map(|i| field(&checked.load[i], scale.load)))
+            .map(|field| -> Arc<dyn Field> { Arc::new(field) }),
         height: [
             Arc::new(upper.clone()),
             Arc::new(LowerHeight { lower, upper }),

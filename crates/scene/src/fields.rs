@@ -1,8 +1,9 @@
 //! Expressions as fields: scaled points in, scaled values out.
 
-use expression::Expression;
+use expression::{Expression, Joint};
 use fem_core::scale::times_power_of_two;
-use fem_core::{Field, FieldError, Samples};
+use fem_core::{Field, FieldError, JointFields, Samples};
+use std::sync::Arc;
 
 /// An expression of the physical coordinates, read at scaled points.
 #[derive(Clone, Debug)]
@@ -17,6 +18,15 @@ pub(crate) struct ExpressionField {
     /// Two factors whose product is 2^-e, e the exponent of the values: 2^-e alone may not be a number.
     factors: [f64; 2],
     positive: bool,
+    /// Both fields of a pair, and which of them this is.
+    joint: Option<(Arc<ExpressionPair>, usize)>,
+}
+
+/// Two fields that are read at the same points.
+#[derive(Debug)]
+struct ExpressionPair {
+    scaled: Joint<2>,
+    fields: [ExpressionField; 2],
 }
 
 impl ExpressionField {
@@ -32,7 +42,22 @@ impl ExpressionField {
             length,
             factors,
             positive: false,
+            joint: None,
         }
+    }
+
+    /// The same fields, which are sampled together for less if neither is constant.
+    pub fn pair(fields: [Self; 2]) -> [Self; 2] {
+        if fields.iter().any(|field| field.constant().is_some()) {
+            return fields;
+        }
+        let scaled = Joint::new(fields.each_ref().map(|field| &field.scaled_expression));
+        let [first, second] = fields.clone();
+        let pair = Arc::new(ExpressionPair { scaled, fields });
+        [(first, 0), (second, 1)].map(|(field, own)| ExpressionField {
+            joint: Some((pair.clone(), own)),
+            ..field
+        })
     }
 
     /// The same field, for which a value that is not positive is an error.
@@ -60,6 +85,21 @@ impl ExpressionField {
         self.expression.eval_at(x, y, region)
     }
 
+    /// Refuses scaled values, which are those at the points, if one of them may not be used.
+    fn judge(&self, at: Samples<'_>, values: &[f64]) -> Result<(), FieldError> {
+        // Nearly always all are good: one test for all of them.
+        if values
+            .iter()
+            .fold(true, |good, value| good & self.is_good(*value))
+        {
+            return Ok(());
+        }
+        match values.iter().position(|value| !self.is_good(*value)) {
+            Some(k) => Err(self.refuse(self.value_at(at, k), at, k)),
+            None => Ok(()),
+        }
+    }
+
     fn refuse(&self, value: f64, at: Samples<'_>, k: usize) -> FieldError {
         FieldError {
             name: self.name.clone(),
@@ -72,23 +112,32 @@ impl ExpressionField {
 
 impl Field for ExpressionField {
     fn sample(&self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
-        self.scaled_expression.eval(at.x, at.y, at.region, out);
-        // Nearly always all are good: one test for all of them.
-        if out
-            .iter()
-            .fold(true, |good, value| good & self.is_good(*value))
-        {
+        if self.scaled_expression.eval(at.x, at.y, at.region, out) && !self.positive {
             return Ok(());
         }
-        match out.iter().position(|value| !self.is_good(*value)) {
-            Some(k) => Err(self.refuse(self.value_at(at, k), at, k)),
-            None => Ok(()),
-        }
+        self.judge(at, out)
     }
 
     fn constant(&self) -> Option<f64> {
         let value = self.scaled(self.expression.constant()?);
         self.is_good(value).then_some(value)
+    }
+
+    fn joint(&self) -> Option<(&dyn JointFields, usize)> {
+        let (pair, own) = self.joint.as_ref()?;
+        Some((&**pair, *own))
+    }
+}
+
+impl JointFields for ExpressionPair {
+    fn sample(&self, at: Samples<'_>, [first, second]: [&mut [f64]; 2]) -> Result<(), FieldError> {
+        let out = [&mut *first, &mut *second];
+        let finite = self.scaled.eval(at.x, at.y, at.region, out);
+        if finite && !self.fields.iter().any(|field| field.positive) {
+            return Ok(());
+        }
+        self.fields[0].judge(at, first)?;
+        self.fields[1].judge(at, second)
     }
 }
 
@@ -140,6 +189,7 @@ impl Field for LowerHeight {
 mod tests {
     use super::*;
     use expression::Scope;
+    use fem_core::FieldPair;
 
     fn field(text: &str, length: i32, value: i32) -> ExpressionField {
         let expression = Expression::parse(text, &Scope::new()).unwrap();
@@ -202,6 +252,50 @@ mod tests {
         assert!(error.value.is_infinite() && error.name == "f");
         let error = sample(&field("x - 3", 1, 4).positive(), &[2.0, 1.0], &[0.0; 2]).unwrap_err();
         assert_eq!((error.x, error.value), (2.0, -1.0));
+    }
+
+    #[test]
+    fn a_pair_gives_what_its_fields_give() {
+        let [f, g] = ExpressionField::pair([
+            field("if(x > 0.5, x^4*y/3 - x, 1/(x - 2))", -1, 3),
+            field("y - x^4*y/3 + if(x > 0.5, 2, 1/(x - 3))", -1, 3),
+        ]);
+        assert_eq!(
+            [&f, &g].map(|f| f.joint().map(|joint| joint.1)),
+            [Some(0), Some(1)]
+        );
+        let x: Vec<f64> = (0..1000).map(|k| k as f64 / 300.0).collect();
+        let y: Vec<f64> = (0..1000).map(|k| 1.0 - k as f64 / 300.0).collect();
+        let at = Samples {
+            x: &x,
+            y: &y,
+            region: &vec![0.0; 1000],
+        };
+        for fields in [[&f, &g], [&g, &f], [&f, &f]] {
+            let mut out = [vec![0.0; 1000], vec![0.0; 1000]];
+            let [first, second] = &mut out;
+            let pair = FieldPair::new(fields.map(|f| -> &dyn Field { f }));
+            pair.sample(at, [first, second]).unwrap();
+            assert_eq!(out, fields.map(|f| sample(f, &x, &y).unwrap()));
+        }
+        // What is wrong with the first is told first.
+        let [f, g] = ExpressionField::pair([field("1/x", 1, 0), field("1/y", 1, 0)]);
+        let pair = FieldPair::new([&f, &g]);
+        let sample = |x: [f64; 2], y: [f64; 2]| {
+            let region = &[0.0; 2];
+            let at = Samples {
+                x: &x,
+                y: &y,
+                region,
+            };
+            pair.sample(at, [&mut [0.0; 2], &mut [0.0; 2]])
+        };
+        assert_eq!(sample([1.0, 0.0], [0.0, 1.0]).unwrap_err().y, 2.0);
+        assert_eq!(sample([1.0, 3.0], [0.5, 0.0]).unwrap_err().x, 6.0);
+        assert!(sample([1.0, 3.0], [0.5, 1.0]).is_ok());
+        // Nothing is gained with a constant.
+        let pair = ExpressionField::pair([field("1/x", 1, 0), field("2", 1, 0)]);
+        assert!(pair.iter().all(|field| field.joint().is_none()));
     }
 
     #[test]

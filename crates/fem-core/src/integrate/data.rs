@@ -2,7 +2,7 @@
 
 use super::Reference;
 use crate::assemble::dual_areas;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, signed_area};
 
 /// Integrals of one load over a mesh.
 #[derive(Clone, Debug, Default)]
@@ -73,15 +73,18 @@ impl Loads {
 
     /// [`Loads::new`] for two loads at once: areas and corners are read once, and both sums of a vertex are side by side.
     pub(super) fn pair(mesh: &Mesh, elements: [Vec<ElementLoad>; 2]) -> [Loads; 2] {
-        let mut nodal = vec![[0.0; 2]; mesh.vertex_count()];
+        let points = mesh.points();
+        let mut nodal = vec![[0.0; 2]; points.len()];
         let [first, second] = &elements;
-        for ((id, first), second) in mesh.triangle_ids().zip(first).zip(second) {
-            let area = mesh.area(id);
-            let moments = first.moments(area).into_iter().zip(second.moments(area));
-            for (v, (first, second)) in mesh.triangles()[id.index()].iter().zip(moments) {
-                let sums = &mut nodal[v.index()];
-                sums[0] += first;
-                sums[1] += second;
+        for ((triangle, first), second) in mesh.triangles().iter().zip(first).zip(second) {
+            let vertices = triangle.map(|v| v.index());
+            let area = signed_area(vertices.map(|v| points[v]));
+            let load = [first.mean * area, second.mean * area];
+            let [one, two] = [0, 1].map(|k| [first.corners[k], second.corners[k]]);
+            let three = [0, 1].map(|i| load[i] - one[i] - two[i]);
+            for (v, moments) in vertices.into_iter().zip([one, two, three]) {
+                let sums = &mut nodal[v];
+                *sums = [sums[0] + moments[0], sums[1] + moments[1]];
             }
         }
         let [first, second] = elements;
@@ -140,6 +143,15 @@ impl Loads {
         match self.elements {
             Elements::Same(value) => Some(value),
             Elements::Each(_) => None,
+        }
+    }
+
+    /// The integrals over all triangles, where they are stored.
+    #[inline]
+    pub(super) fn each(&self) -> Option<&[ElementLoad]> {
+        match &self.elements {
+            Elements::Same(_) => None,
+            Elements::Each(each) => Some(each),
         }
     }
 

@@ -1,15 +1,17 @@
 //! Loads: their moments over elements.
 
+use std::ops::Range;
+
 use super::carry::kept;
-use super::whole::{self, Fit};
+use super::whole::{self, Fits};
 use super::{
     Allowed, Control, ElementLoad, Integrand, Judgement, Loads, Piece, Reference, Whole, divide,
 };
-use crate::field::{Constant, Field, FieldError, Samples};
+use crate::field::{Constant, Field, FieldError, FieldPair, Samples};
 use crate::index::TriangleId;
 use crate::mesh::Mesh;
 use crate::parallel::{self, BLOCK};
-use crate::quadrature::{POINTS, RulePoint, affine_misfit};
+use crate::quadrature::{POINTS, RulePoint, affine_misfit, affine_misfits};
 
 /// The tolerance of loads: a piece cut by a jump is quartered until its area is about this share of the domain.
 pub const LOAD_CONTROL: Control = Control {
@@ -79,7 +81,7 @@ pub fn load_pair_relative_to(
     fields: [&dyn Field; 2],
     threads: usize,
 ) -> Result<[Loads; 2], FieldError> {
-    pair(reference, mesh, fields, threads, |_| None)
+    pair(reference, mesh, fields, threads, None)
 }
 
 /// The loads on a mesh made from another one by [`Mesh::refine`]: only the triangles that it bisected are sampled. The result is what
@@ -100,18 +102,16 @@ pub fn load_pair_carried(
         Some(reference) => reference,
         None => Reference::of(mesh, fields)?,
     };
-    pair(&reference, mesh, fields, threads, |t| {
-        kept(parent, t).map(|old| (before, old))
-    })
+    pair(&reference, mesh, fields, threads, Some((before, parent)))
 }
 
-/// Integrates where `known` has nothing to be taken over: loads, and the number of the triangle in them.
-fn pair<'a>(
+/// Integrates where the loads on a mesh before, with the parents of its triangles, have nothing to be taken over.
+fn pair(
     reference: &Reference,
     mesh: &Mesh,
     fields: [&dyn Field; 2],
     threads: usize,
-    known: impl Fn(usize) -> Option<(&'a [Loads; 2], usize)> + Sync,
+    known: Option<(&[Loads; 2], &[TriangleId])>,
 ) -> Result<[Loads; 2], FieldError> {
     let constants = fields.map(|f| f.constant());
     if let [Some(f), Some(g)] = constants {
@@ -119,7 +119,8 @@ fn pair<'a>(
     }
     let count = mesh.triangle_count();
     let mut pair = LoadPair {
-        fields,
+        single: fields,
+        fields: FieldPair::new(fields),
         reference: *reference,
         elements: [0, 1].map(|i| {
             let room = if constants[i].is_some() { 0 } else { count };
@@ -150,7 +151,8 @@ pub fn judge_load(piece: &Piece<'_>, component: usize) -> Judgement {
 
 /// Two loads under way.
 struct LoadPair<'a> {
-    fields: [&'a dyn Field; 2],
+    single: [&'a dyn Field; 2],
+    fields: FieldPair<'a>,
     reference: Reference,
     /// What is known of the triangles; nothing of a constant.
     elements: [Vec<ElementLoad>; 2],
@@ -163,11 +165,11 @@ struct LoadPair<'a> {
 
 impl LoadPair<'_> {
     /// Fills the elements: takes over, samples, and divides what seven points do not do for.
-    fn fill<'b>(
+    fn fill(
         &mut self,
         mesh: &Mesh,
         constants: [Option<f64>; 2],
-        known: impl Fn(usize) -> Option<(&'b [Loads; 2], usize)> + Sync,
+        known: Option<(&[Loads; 2], &[TriangleId])>,
     ) -> Result<(), FieldError> {
         let count = mesh.triangle_count();
         let control = LOAD_CONTROL;
@@ -176,7 +178,11 @@ impl LoadPair<'_> {
             coarse: control.largest_share * self.reference.area,
             whole: Whole::Same(self.reference.magnitude),
         };
-        let fields = self.fields;
+        let largest = self
+            .reference
+            .magnitude
+            .map(|whole| control.tolerance * whole);
+        let (single, fields) = (self.single, self.fields);
         let mut chunks = self.elements.each_mut().map(|e| e.chunks_mut(BLOCK));
         let jobs: Vec<_> = parallel::blocks(count)
             .map(|block| {
@@ -187,43 +193,53 @@ impl LoadPair<'_> {
         // Every block of triangles by itself; returns those that are to be divided.
         let results = parallel::map(self.threads, jobs, |(block, mut elements)| {
             let begin = block.start;
-            let mut fresh = Vec::new();
-            for t in block {
-                let Some((loads, old)) = known(t) else {
-                    fresh.push(t as u32);
-                    continue;
-                };
-                for (i, elements) in elements.iter_mut().enumerate() {
-                    if constants[i].is_none() {
-                        elements[t - begin] = loads[i].element(old);
+            let fresh = match known {
+                Some((before, parent)) => {
+                    take_over(&mut elements, constants, before, parent, block)
+                }
+                None => block.map(|t| t as u32).collect(),
+            };
+            let mut wanting = Vec::new();
+            // A constant has no say in how often an element is divided.
+            let mut put = |list: &[u32], area: &whole::Row, loads: &[(usize, &Fits)]| {
+                for &(i, fits) in loads {
+                    store(elements[i], begin, list, area, fits);
+                }
+                let area = &area[..list.len()];
+                // Nearly always all are good: one test for all of them.
+                let mut wrong = area
+                    .iter()
+                    .fold(false, |wrong, area| wrong | (*area > allowed.coarse));
+                for &(i, fits) in loads {
+                    let errors = area
+                        .iter()
+                        .zip(&fits.error)
+                        .map(|(area, error)| error * area);
+                    wrong = errors.fold(wrong, |wrong, error| wrong | (error > largest[i]));
+                }
+                if !wrong {
+                    return;
+                }
+                for (k, (&t, &area)) in list.iter().zip(area).enumerate() {
+                    let is_wrong = |&(i, fits): &(usize, &Fits)| fits.error[k] * area > largest[i];
+                    if area > allowed.coarse || loads.iter().any(is_wrong) {
+                        wanting.push(t);
                     }
                 }
-            }
-            let mut wanting = Vec::new();
-            let mut put = |t: usize, area: f64, loads: &[(usize, Fit)]| {
-                let mut errors = [0.0; 2];
-                for &(i, fit) in loads {
-                    errors[i] = fit.error * area;
-                    elements[i][t - begin] = ElementLoad {
-                        corners: fit.corners.map(|m| m * area),
-                        mean: fit.mean,
-                        deviation_squared: fit.variance * area,
-                    };
-                }
-                if area > allowed.coarse || allowed.too_large(t, errors) {
-                    wanting.push(t as u32);
-                }
             };
-            let list = fresh.into_iter();
-            // A constant has no say in how often an element is divided.
             match constants {
-                [None, None] => whole::fit(mesh, list, fields, |t, area, [f, g]| {
-                    put(t, area, &[(0, f), (1, g)]);
-                })?,
+                [None, None] => {
+                    let sample = |at: Samples<'_>, out: [&mut [f64]; 2]| fields.sample(at, out);
+                    whole::fit(mesh, &fresh, sample, |list, area, [f, g]| {
+                        put(list, area, &[(0, f), (1, g)]);
+                    })?;
+                }
                 _ => {
                     let i = usize::from(constants[0].is_some());
-                    whole::fit(mesh, list, [fields[i]], |t, area, [f]| {
-                        put(t, area, &[(i, f)]);
+                    let sample =
+                        |at: Samples<'_>, [out]: [&mut [f64]; 1]| single[i].sample(at, out);
+                    whole::fit(mesh, &fresh, sample, |list, area, [f]| {
+                        put(list, area, &[(i, f)]);
                     })?;
                 }
             }
@@ -277,6 +293,49 @@ impl LoadPair<'_> {
     }
 }
 
+/// Takes over what is known of the triangles of a block, and lists the others. Nothing is stored of constants.
+fn take_over(
+    elements: &mut [&mut [ElementLoad]; 2],
+    constants: [Option<f64>; 2],
+    before: &[Loads; 2],
+    parent: &[TriangleId],
+    block: Range<usize>,
+) -> Vec<u32> {
+    let mut fresh = Vec::with_capacity(block.len());
+    let mut taken = Vec::with_capacity(block.len());
+    for t in block.clone() {
+        match kept(parent, t) {
+            Some(old) => taken.push((t - block.start, old)),
+            None => fresh.push(t as u32),
+        }
+    }
+    for i in (0..2).filter(|i| constants[*i].is_none()) {
+        let elements = &mut *elements[i];
+        match before[i].each() {
+            Some(each) => taken.iter().for_each(|&(t, old)| elements[t] = each[old]),
+            None => taken
+                .iter()
+                .for_each(|&(t, old)| elements[t] = before[i].element(old)),
+        }
+    }
+    fresh
+}
+
+/// Stores what the samples of a load tell of the triangles of `list`; `elements` are those from the triangle `begin` on.
+fn store(elements: &mut [ElementLoad], begin: usize, list: &[u32], area: &whole::Row, fits: &Fits) {
+    let n = list.len();
+    let [first, second] = fits.corners.each_ref().map(|row| &row[..n]);
+    let [mean, variance, area] = [&fits.mean, &fits.variance, area].map(|row| &row[..n]);
+    for k in 0..n {
+        let area = area[k];
+        elements[list[k] as usize - begin] = ElementLoad {
+            corners: [first[k] * area, second[k] * area],
+            mean: mean[k],
+            deviation_squared: variance[k] * area,
+        };
+    }
+}
+
 impl Integrand for LoadPair<'_> {
     fn components(&self) -> usize {
         2
@@ -284,8 +343,7 @@ impl Integrand for LoadPair<'_> {
 
     fn sample(&mut self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
         let (first, second) = out.split_at_mut(at.len());
-        self.fields[0].sample(at, first)?;
-        self.fields[1].sample(at, second)
+        self.fields.sample(at, [first, second])
     }
 
     fn judge(&self, piece: &Piece<'_>) -> Judgement {
@@ -294,6 +352,15 @@ impl Integrand for LoadPair<'_> {
 
     fn judge_second(&self, piece: &Piece<'_>) -> Judgement {
         judge_load(piece, 1)
+    }
+
+    fn errors(&self, piece: &Piece<'_>) -> [f64; 2] {
+        let samples = [0, 1].map(|i| piece.values(i));
+        let misfits = affine_misfits(piece.rule, samples);
+        [0, 1].map(|i| {
+            let largest = samples[i].iter().fold(0.0f64, |m, v| m.max(v.abs()));
+            smooth_error(misfits[i], largest) * piece.area
+        })
     }
 
     fn clear(&mut self, triangle: usize) {

@@ -69,11 +69,15 @@ fn means_where(
     let mut wanting = Vec::new();
     let mut magnitudes = vec![[0.0; 2]; count];
     let tolerance = MEAN_CONTROL.tolerance;
-    whole::fit(mesh, fresh.into_iter(), [field], |t, _, [fit]| {
-        sums.base[t] = fit.mean;
-        if fit.error > tolerance * fit.largest {
-            magnitudes[t][0] = fit.largest;
-            wanting.push(t as u32);
+    let sample = |at: Samples<'_>, [out]: [&mut [f64]; 1]| field.sample(at, out);
+    whole::fit(mesh, &fresh, sample, |list, _, [fits]| {
+        for (k, &id) in list.iter().enumerate() {
+            let t = id as usize;
+            sums.base[t] = fits.mean[k];
+            if fits.error[k] > tolerance * fits.largest[k] {
+                magnitudes[t][0] = fits.largest[k];
+                wanting.push(id);
+            }
         }
     })?;
     if !wanting.is_empty() {

@@ -53,6 +53,11 @@ pub trait Integrand {
         }
     }
 
+    /// The errors of both judgements.
+    fn errors(&self, piece: &Piece<'_>) -> [f64; 2] {
+        [self.judge(piece), self.judge_second(piece)].map(|judgement| judgement.error)
+    }
+
     /// The parts that every element is sampled in to begin with.
     fn partition(&self) -> Partition {
         Partition::Whole
@@ -343,8 +348,7 @@ fn divide(
             &parts,
             integrand,
             &mut |integrand, piece, part| {
-                let errors = [integrand.judge(piece), integrand.judge_second(piece)]
-                    .map(|judgement| judgement.error);
+                let errors = integrand.errors(piece);
                 let divisible = part.depth < control.depth
                     && piece.area > smallest(mesh, TriangleId(part.triangle));
                 let coarse = piece.area > allowed.coarse;

@@ -1,7 +1,7 @@
 //! What the tolerances of loads are relative to.
 
 use super::{Control, Integrand, Judgement, Piece, integrate};
-use crate::field::{Field, FieldError, Samples};
+use crate::field::{Field, FieldError, FieldPair, Samples};
 use crate::mesh::Mesh;
 
 /// The size of a domain and of the two loads on it, found once for a problem.
@@ -39,7 +39,7 @@ impl Reference {
             largest_share: SHARE,
         };
         let mut sizes = Sizes {
-            fields,
+            fields: FieldPair::new(fields),
             sums: vec![[0.0; 2]; mesh.triangle_count()],
         };
         integrate(mesh, control, &mut sizes)?;
@@ -60,7 +60,7 @@ fn known(magnitude: f64) -> f64 {
 
 /// Integrals of absolute values: pieces are divided for their size alone.
 struct Sizes<'a> {
-    fields: [&'a dyn Field; 2],
+    fields: FieldPair<'a>,
     sums: Vec<[f64; 2]>,
 }
 
@@ -71,8 +71,7 @@ impl Integrand for Sizes<'_> {
 
     fn sample(&mut self, at: Samples<'_>, out: &mut [f64]) -> Result<(), FieldError> {
         let (first, second) = out.split_at_mut(at.len());
-        self.fields[0].sample(at, first)?;
-        self.fields[1].sample(at, second)
+        self.fields.sample(at, [first, second])
     }
 
     fn judge(&self, _: &Piece<'_>) -> Judgement {

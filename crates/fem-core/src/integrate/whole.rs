@@ -2,44 +2,33 @@
 
 use super::lanes;
 use super::smooth_error;
-use crate::field::{Field, FieldError, Samples};
-use crate::index::TriangleId;
+use crate::field::{FieldError, Samples};
 use crate::mesh::{Mesh, signed_area};
 use crate::quadrature::{POINTS, rule};
 
-/// Elements that are sampled together: their points fill a block of 256, the best size for expressions.
-pub(super) const BLOCK: usize = 36;
+/// Elements that are sampled together: their points are whole steps of a block of expressions.
+pub(super) const BLOCK: usize = 80;
 
-/// Elements that are worked on together: arrays so short stay in registers.
-const LANES: usize = 4;
-
-/// What the seven samples of a function tell of it on an element.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Fit {
-    /// Mean.
-    pub mean: f64,
-    /// Means of f phi_0 and f phi_1.
-    pub corners: [f64; 2],
-    /// Mean of (f - mean)^2.
-    pub variance: f64,
-    /// The largest absolute value of a sample.
-    pub largest: f64,
-    /// The error of the mean that the misfit of the samples points to.
-    pub error: f64,
-}
+/// Elements that are worked on together: their numbers nearly fit in the registers, and what is the same for all is loaded for so many at once.
+const LANES: usize = 8;
 
 /// One number for every element of a block.
 pub(super) type Row = [f64; BLOCK];
 
-/// The fits of one field on the elements of a block.
+/// What the seven samples of a function tell of it on the elements of a block.
 #[repr(align(32))]
 #[derive(Clone, Debug)]
 pub(super) struct Fits {
-    mean: Row,
-    corners: [Row; 2],
-    variance: Row,
-    largest: Row,
-    error: Row,
+    /// Means.
+    pub mean: Row,
+    /// Means of f phi_0 and f phi_1.
+    pub corners: [Row; 2],
+    /// Means of (f - mean)^2.
+    pub variance: Row,
+    /// The largest absolute values of the samples.
+    pub largest: Row,
+    /// The errors of the means that the misfits of the samples point to.
+    pub error: Row,
 }
 
 impl Fits {
@@ -50,17 +39,6 @@ impl Fits {
         largest: [0.0; BLOCK],
         error: [0.0; BLOCK],
     };
-
-    #[inline]
-    fn at(&self, k: usize) -> Fit {
-        Fit {
-            mean: self.mean[k],
-            corners: [self.corners[0][k], self.corners[1][k]],
-            variance: self.variance[k],
-            largest: self.largest[k],
-            error: self.error[k],
-        }
-    }
 }
 
 /// The samples of a field at the points of a block.
@@ -68,33 +46,33 @@ impl Fits {
 #[derive(Clone)]
 pub(super) struct Values(pub(super) [f64; BLOCK * POINTS]);
 
-/// Samples fields on the triangles of `list` and shows every triangle with its area and the fits of the fields.
+/// Samples fields on the triangles of `list` and shows every block of triangles, with their areas and the fits of the fields. `sample` samples
+/// all fields.
 ///
 /// # Errors
-/// A value of a field that is not finite.
+/// What `sample` reports.
 pub(super) fn fit<const N: usize>(
     mesh: &Mesh,
-    list: impl Iterator<Item = u32>,
-    fields: [&dyn Field; N],
-    mut visit: impl FnMut(usize, f64, [Fit; N]),
+    list: &[u32],
+    mut sample: impl FnMut(Samples<'_>, [&mut [f64]; N]) -> Result<(), FieldError>,
+    mut visit: impl FnMut(&[u32], &Row, &[Fits; N]),
 ) -> Result<(), FieldError> {
     let table = Table::new();
     let mut block = Block::new();
-    let mut values = Values([0.0; BLOCK * POINTS]);
+    let mut values = [const { Values([0.0; BLOCK * POINTS]) }; N];
     let mut fits = [const { Fits::NONE }; N];
-    let mut list = list.peekable();
-    while list.peek().is_some() {
-        block.gather(mesh, list.by_ref().take(BLOCK));
+    for list in list.chunks(BLOCK) {
+        block.gather(mesh, list);
         lanes::place(&mut block, &table);
         let stride = block.stride();
-        for (field, fits) in fields.iter().zip(&mut fits) {
-            field.sample(block.samples(), &mut values.0[..stride * POINTS])?;
-            lanes::fit(&table, &values, stride, fits);
+        sample(
+            block.samples(),
+            values.each_mut().map(|v| &mut v.0[..stride * POINTS]),
+        )?;
+        for (values, fits) in values.iter().zip(&mut fits) {
+            lanes::fit(&table, values, stride, fits);
         }
-        for k in 0..block.count {
-            let t = block.triangles[k] as usize;
-            visit(t, block.area[k], fits.each_ref().map(|f| f.at(k)));
-        }
+        visit(list, &block.area, &fits);
     }
     Ok(())
 }
@@ -108,7 +86,6 @@ pub(super) struct Block {
     x: [f64; BLOCK * POINTS],
     y: [f64; BLOCK * POINTS],
     region: [f64; BLOCK * POINTS],
-    triangles: [u32; BLOCK],
     count: usize,
     /// What all of `region` was filled with last, if it was the same.
     same_region: Option<i32>,
@@ -122,7 +99,6 @@ impl Block {
             x: [0.0; BLOCK * POINTS],
             y: [0.0; BLOCK * POINTS],
             region: [0.0; BLOCK * POINTS],
-            triangles: [0; BLOCK],
             count: 0,
             same_region: Some(0),
         }
@@ -143,39 +119,41 @@ impl Block {
     }
 
     /// Takes at most [`BLOCK`] triangles and at least one, with their corners and regions.
-    fn gather(&mut self, mesh: &Mesh, list: impl Iterator<Item = u32>) {
-        self.count = 0;
+    fn gather(&mut self, mesh: &Mesh, list: &[u32]) {
+        let [[ax, ay], [bx, by], [cx, cy]] = &mut self.corners;
+        let (points, triangles, region) = (mesh.points(), mesh.triangles(), mesh.region());
         let mut put = |k: usize, t: u32| {
-            let c = mesh.corners(TriangleId(t));
-            for (to, from) in self.corners.iter_mut().zip(c) {
-                to[0][k] = from[0];
-                to[1][k] = from[1];
-            }
-            self.triangles[k] = t;
+            let [a, b, c] = triangles[t as usize].map(|v| points[v.index()]);
+            (ax[k], ay[k]) = (a[0], a[1]);
+            (bx[k], by[k]) = (b[0], b[1]);
+            (cx[k], cy[k]) = (c[0], c[1]);
         };
-        let mut last = 0;
-        for t in list {
-            put(self.count, t);
-            self.count += 1;
-            last = t;
+        self.count = list.len().min(BLOCK);
+        let list = &list[..self.count];
+        for (k, t) in list.iter().enumerate() {
+            put(k, *t);
         }
         // The last element again, so that no lane is without one.
+        let last = list[self.count - 1];
         for k in self.count..self.count.next_multiple_of(LANES) {
             put(k, last);
         }
-        let stride = self.stride();
-        let region = |k: usize| mesh.region()[self.triangles[k] as usize];
-        let first = region(0);
-        let same = (1..stride).all(|k| region(k) == first).then_some(first);
+        let first = region[list[0] as usize];
+        let differs = list
+            .iter()
+            .fold(0, |all, t| all | (region[*t as usize] ^ first));
+        let same = (differs == 0).then_some(first);
         if same.is_some() && same == self.same_region {
             return;
         }
         match same {
             Some(first) => self.region.fill(f64::from(first)),
             None => {
+                let stride = self.stride();
                 for q in 0..POINTS {
                     for k in 0..stride {
-                        self.region[q * stride + k] = f64::from(region(k));
+                        let t = list.get(k).copied().unwrap_or(last);
+                        self.region[q * stride + k] = f64::from(region[t as usize]);
                     }
                 }
             }
@@ -209,6 +187,8 @@ pub(super) struct Table {
     weight: [f64; POINTS],
     /// Weight times (lambda_k - 1/3) for the corners 0 and 1; the three sum to zero.
     slope: [[f64; 2]; POINTS],
+    /// What the fitted function has at a point of its slopes for the corners 0 and 1.
+    fitted: [[f64; 2]; POINTS],
 }
 
 impl Table {
@@ -218,31 +198,44 @@ impl Table {
             at: rule.map(|p| p.at),
             weight: rule.map(|p| p.weight),
             slope: rule.map(|p| [0, 1].map(|k| p.weight * (p.at[k] - 1.0 / 3.0))),
+            fitted: rule.map(|p| [0, 1].map(|k| 12.0 * (p.at[k] - p.at[2]))),
         }
     }
 
     /// Fits affine functions to the samples of the elements of a block, see [`crate::quadrature::affine_fit`].
     #[inline(always)]
     pub(super) fn fit(&self, values: &Values, stride: usize, fits: &mut Fits) {
-        for first in (0..stride).step_by(LANES) {
-            self.fit_lanes(values, stride, first, fits);
+        type Lanes = [f64; LANES];
+        let groups = stride / LANES;
+        let rows: [&[Lanes]; POINTS] = std::array::from_fn(|q| {
+            &values.0[q * stride..(q + 1) * stride].as_chunks().0[..groups]
+        });
+        let [first, second] = &mut fits.corners;
+        let rows_out = [&mut fits.mean, first, second, &mut fits.variance];
+        let [means, firsts, seconds, variances] =
+            rows_out.map(|row| &mut row.as_chunks_mut::<LANES>().0[..groups]);
+        let [sizes, errors] = [&mut fits.largest, &mut fits.error]
+            .map(|row| &mut row.as_chunks_mut::<LANES>().0[..groups]);
+        for g in 0..groups {
+            let fit = self.fit_lanes(rows.map(|row| &row[g]));
+            means[g] = fit.mean;
+            [firsts[g], seconds[g]] = fit.corners;
+            variances[g] = fit.variance;
+            sizes[g] = fit.largest;
+            errors[g] = fit.error;
         }
     }
 
     #[inline(always)]
-    fn fit_lanes(&self, values: &Values, stride: usize, begin: usize, fits: &mut Fits) {
+    fn fit_lanes(&self, samples: [&[f64; LANES]; POINTS]) -> FitLanes {
         type Lanes = [f64; LANES];
-        let sample = |q: usize| -> Lanes {
-            let at = &values.0[q * stride + begin..][..LANES];
-            std::array::from_fn(|l| at[l])
-        };
-        let base = sample(0);
+        let base = *samples[0];
         let mut largest: Lanes = base.map(f64::abs);
         let (mut mean, mut square): (Lanes, Lanes) = ([0.0; LANES], [0.0; LANES]);
         let (mut first, mut second): (Lanes, Lanes) = ([0.0; LANES], [0.0; LANES]);
         // The first sample is the base, of which nothing is left.
         for q in 1..POINTS {
-            let v = sample(q);
+            let v = samples[q];
             for l in 0..LANES {
                 let d = v[l] - base[l];
                 let size = v[l].abs();
@@ -257,29 +250,31 @@ impl Table {
         // the sum of the others.
         let mut misfit: Lanes = [0.0; LANES];
         for q in 0..POINTS {
-            let v = sample(q);
-            let [a, b] = [0, 1].map(|k| 12.0 * (self.at[q][k] - self.at[q][2]));
+            let v = samples[q];
+            let [a, b] = self.fitted[q];
             for l in 0..LANES {
                 let off = (v[l] - base[l] - (mean[l] + a * first[l] + b * second[l])).abs();
                 misfit[l] = if off > misfit[l] { off } else { misfit[l] };
             }
         }
-        let put = |to: &mut Row, value: Lanes| to[begin..][..LANES].copy_from_slice(&value);
         let lanes = |f: &dyn Fn(usize) -> f64| -> Lanes { std::array::from_fn(f) };
-        put(&mut fits.mean, lanes(&|l| base[l] + mean[l]));
-        for (to, slope) in fits.corners.iter_mut().zip([first, second]) {
-            put(to, lanes(&|l| (base[l] + mean[l]) / 3.0 + slope[l]));
+        FitLanes {
+            mean: lanes(&|l| base[l] + mean[l]),
+            corners: [first, second].map(|slope| lanes(&|l| (base[l] + mean[l]) / 3.0 + slope[l])),
+            variance: lanes(&|l| (square[l] - mean[l] * mean[l]).max(0.0)),
+            largest,
+            error: lanes(&|l| smooth_error(misfit[l], largest[l])),
         }
-        put(
-            &mut fits.variance,
-            lanes(&|l| (square[l] - mean[l] * mean[l]).max(0.0)),
-        );
-        put(&mut fits.largest, largest);
-        put(
-            &mut fits.error,
-            lanes(&|l| smooth_error(misfit[l], largest[l])),
-        );
     }
+}
+
+/// [`Fits`] of the elements of a group.
+struct FitLanes {
+    mean: [f64; LANES],
+    corners: [[f64; LANES]; 2],
+    variance: [f64; LANES],
+    largest: [f64; LANES],
+    error: [f64; LANES],
 }
 
 #[cfg(test)]
