@@ -84,52 +84,51 @@ impl Sharing {
         let waiting = self
             .operands(place)
             .find_map(|operand| self.pending(operand));
-        if !waiting.is_some_and(|term| self.both(term, place)) {
+        if !waiting.is_some_and(|term| self.both(term)) {
             self.emit(place);
         }
     }
 
-    /// Emits a sum of a shared term together with the other one, if what that takes can be had now.
-    fn both(&mut self, place: usize, sum: usize) -> bool {
+    /// Emits both sums of the shared term at `place` together, if what that takes can be had now.
+    fn both(&mut self, place: usize) -> bool {
         let Some((term, sums)) = self.shared(place) else {
             return false;
         };
-        let [first, second] = sums.map(|sum| self.joined(sum, place));
-        let [one, two] = sums.map(|sum| self.target(sum));
-        let (Some(first), Some(second), Some(one), Some(two)) = (first, second, one, two) else {
+        let joined = sums.map(|sum| self.joined(sum, place));
+        let targets = sums.map(|sum| self.target(sum));
+        let ([Some(first), Some(second)], [Some(one), Some(two)]) = (joined, targets) else {
             return false;
         };
-        let not = [place, sums[0], sums[1]];
         let mut needed = Vec::new();
-        if self.done[sums[0]] || self.done[sums[1]] || !sums.contains(&sum) {
-            return false;
-        }
         if ![first.1, second.1]
             .into_iter()
-            .all(|operand| self.collect(operand, &not, &mut needed))
+            .all(|operand| self.collect(operand, &mut needed))
         {
             return false;
         }
         needed.into_iter().for_each(|place| self.emit(place));
-        not.into_iter().for_each(|place| self.done[place] = true);
+        for place in [place, sums[0], sums[1]] {
+            self.done[place] = true;
+        }
         self.out.push(Op::Both([one, two], term, [first, second]));
         true
     }
 
-    /// Lists what is to come before an operand, in order; false if that is much, or among the instructions of `not`, or waits itself.
-    fn collect(&self, operand: Operand, not: &[usize], needed: &mut Vec<usize>) -> bool {
+    /// Lists what is to come before an operand, in order; false if that is much, or if a shared term is among it, as it is where one sum of the term
+    /// needs the other.
+    fn collect(&self, operand: Operand, needed: &mut Vec<usize>) -> bool {
         let Some(place) = self.pending(operand) else {
             return true;
         };
         if needed.contains(&place) {
             return true;
         }
-        if not.contains(&place) || self.shared(place).is_some() || needed.len() >= MOVED {
+        if self.shared(place).is_some() || needed.len() >= MOVED {
             return false;
         }
         if !self
             .operands(place)
-            .all(|operand| self.collect(operand, not, needed))
+            .all(|operand| self.collect(operand, needed))
         {
             return false;
         }

@@ -242,6 +242,19 @@ fn points() -> Vec<[f64; 3]> {
         .collect()
 }
 
+/// Terms of sums, with awkward factors.
+const POOL: [&str; 9] = [
+    "x*y",
+    "3*x*y/7",
+    "x^2/3",
+    "36*x^2*y^2",
+    "x^4*y^2*0.1",
+    "y/12",
+    "sin(x)*y",
+    "x",
+    "(x*y + 2)*y",
+];
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -305,6 +318,41 @@ proptest! {
                     let same = one.to_bits() == two.to_bits() || (one.is_nan() && two.is_nan());
                     prop_assert!(same, "{source} at {} {}: {one} joined with {sources:?}, {two} alone", x[k], y[k]);
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn joined_sums_give_the_bits_of_each(order in prop::collection::vec((0..POOL.len(), any::<bool>(), 0..7), 2..12)) {
+        // One sum has the terms in this order, and the other one most of them, some with the other sign or elsewhere.
+        let (mut first, mut second) = ("x - 7".to_owned(), "y".to_owned());
+        let mut late = String::new();
+        for (term, minus, how) in order {
+            let [own, other] = if minus { ['-', '+'] } else { ['+', '-'] };
+            let term = POOL[term];
+            first += &format!(" {own} {term}");
+            match how {
+                0 => late += &format!(" {other} {term}"),
+                1 => second += &format!(" {own} sin(y)/{term}"),
+                2 | 3 => second += &format!(" {other} {term}"),
+                4 => second = format!("{term} {own} ({second})"),
+                _ => second += &format!(" {own} {term}"),
+            }
+        }
+        let sources = [first, second + &late];
+        let parsed = sources.each_ref().map(|source| Expression::parse(source, &Scope::new()));
+        let [Ok(first), Ok(second)] = parsed else {
+            panic!("{sources:?}");
+        };
+        let points = points();
+        let [x, y] = [0, 1].map(|k| points.iter().map(|point| point[k]).collect::<Vec<_>>());
+        let mut together = [0, 1].map(|_| vec![7e77; x.len()]);
+        Joint::new([&first, &second]).eval(&x, &y, &[], together.each_mut().map(|out| &mut out[..]));
+        for (own, expression) in together.iter().zip([&first, &second]) {
+            for (k, value) in own.iter().enumerate() {
+                let alone = expression.eval_at(x[k], y[k], 0.0);
+                let same = value.to_bits() == alone.to_bits() || (value.is_nan() && alone.is_nan());
+                prop_assert!(same, "{sources:?} at {} {}: {value} joined, {alone} alone", x[k], y[k]);
             }
         }
     }

@@ -158,10 +158,11 @@ fn terms_of_two_sums_are_computed_for_both() {
     assert_eq!(both(&["sin(x) - x*y", "cos(y) + x*y"]), "sc*");
     assert_eq!(both(&["sin(x) - x*y + x*x", "cos(y) + x*y - x*x"]), "sc**");
     assert_eq!(both(&["x + y*y/3 - x*y*4", "y + x*y*4 + y*y/3"]), "pt.p*.");
-    // Not of one sum and something else, of three, of the same sum twice, of sums that need each other, or across branches.
+    // Not of one sum and something else, of three, of the same sum twice, of a result, of sums that need each other, or across branches.
     assert_eq!(both(&["x + x*y", "sin(x*y)"]), "p.s");
     assert_eq!(both(&["x + x*y", "y + x*y", "3 - x*y"]), "p...");
     assert_eq!(both(&["x*y + x*y"]), "p.");
+    assert_eq!(both(&["x + x*y", "y - x*y", "x*y"]), "p..");
     assert_eq!(both(&["(x + x*y) - x*y"]), "p..");
     assert_eq!(
         both(&["x + x*y", "if(x > 0, sin(x + y + x*y), x)"]),
