@@ -270,9 +270,9 @@ fn only_new_triangles_are_sampled() {
         };
         let new = (0..mesh.triangle_count()).filter(bisected).count();
         let samples = f.0.load(std::sync::atomic::Ordering::Relaxed);
-        // The last elements of every block are sampled four at a time.
+        // The last elements of every block are sampled eight at a time.
         let sampled: usize = fem_core::parallel::blocks(mesh.triangle_count())
-            .map(|block| block.filter(bisected).count().next_multiple_of(4))
+            .map(|block| block.filter(bisected).count().next_multiple_of(8))
             .sum();
         assert_eq!(samples, 7 * sampled);
         assert!(new < mesh.triangle_count());
