@@ -129,7 +129,7 @@ impl Expression {
     /// Evaluates at the points `(x[i], y[i])` of the regions `region[i]` into `out[i]`. `region` may be empty: then it
     /// is 0 everywhere. Values that are not finite are written as they are; the answer is whether all are finite.
     ///
-    /// Nothing is allocated once the thread has evaluated a formula as large; a block of 256 points is the best size, and multiples of 16 are best.
+    /// Nothing is allocated once the thread has evaluated a formula as large; some hundred points at a time cost least, best a multiple of 16.
     ///
     /// # Panics
     ///
