@@ -3,12 +3,15 @@
 //! `cargo bench -p membranes -p estimate --bench certificate` prints seconds, and after `-- instructions` the instructions a triangle as
 //! valgrind's callgrind counts them, which travel between machines of one kind.
 
-use std::time::Instant;
+#[path = "kernels/clock.rs"]
+mod clock;
 
 use contact::{DiscreteProblem, Settings, Solution};
 use estimate::certificate::POINCARE;
 use estimate::{Given, Grade, Moments, certify};
 use fem_core::{Children, Constant, Field, Mesh};
+
+use clock::best;
 
 /// The L-shape with constant loads, refined uniformly.
 fn lshape(refinements: usize) -> Mesh {
@@ -83,19 +86,10 @@ impl Case {
             tension_mean: mean,
             displacement: &self.solution.displacement,
             force: &self.solution.force,
+            threads: 1,
         };
         certify(&given, grade, POINCARE).expect("finite").bound
     }
-}
-
-fn best(repeat: usize, mut work: impl FnMut() -> f64) -> f64 {
-    let mut least = f64::INFINITY;
-    for _ in 0..repeat {
-        let clock = Instant::now();
-        std::hint::black_box(work());
-        least = least.min(clock.elapsed().as_secs_f64());
-    }
-    least
 }
 
 /// Counts this program under callgrind with one certificate and without any.

@@ -21,6 +21,8 @@ use adapt::output::{OutputError, peak_memory_mb};
 use adapt::settings::Stop;
 use adapt::{Level, LevelRecord, Reason};
 
+#[path = "kernels/clock.rs"]
+mod clock;
 #[path = "kernels/limits.rs"]
 mod limits;
 
