@@ -43,6 +43,7 @@ fn of(
         tension_mean: mean,
         displacement: &solution.displacement,
         force: &solution.force,
+        threads: 1,
     };
     certify(&given, grade, poincare).expect("good data")
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use contact::DiscreteProblem;
-use estimate::Moments;
+use estimate::{Moments, Near};
 use fem_core::integrate::{
     Loads, Reference, load_pair_carried, load_pair_relative_to, means, means_carried,
 };
@@ -103,8 +103,20 @@ pub(crate) fn moments_near(
 ) -> Result<Moments, DataError> {
     let reference = reference(problem, discrete)?;
     let (load, tension) = (problem.loads(), problem.tensions());
-    let mesh = &discrete.mesh;
-    Ok(Moments::near(&reference, mesh, load, tension, force)?)
+    let near = near(discrete, force);
+    Ok(Moments::near(
+        &reference,
+        &discrete.mesh,
+        load,
+        tension,
+        near,
+    )?)
+}
+
+/// What tells where a certificate with these action forces needs samples.
+pub(crate) fn near<'a>(discrete: &'a DiscreteProblem, force: &'a [f64]) -> Near<'a> {
+    let loads = &discrete.loads;
+    Near { force, loads }
 }
 
 /// What the elements were judged by.

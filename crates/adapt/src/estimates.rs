@@ -3,10 +3,10 @@
 use contact::{DiscreteProblem, Solution};
 use estimate::certificate::POINCARE;
 use estimate::{
-    Certificate, ContactSet, Energy, Given, GlobalBound, Grade, Moments, Paper, Squares,
+    Certificate, ContactSet, Energy, Given, GlobalBound, Grade, Moments, Paper, Prepared, Squares,
     TrueErrors, certify,
 };
-use fem_core::{FieldError, Mesh, Scale};
+use fem_core::{Mesh, Scale};
 
 use crate::level::BALANCE;
 use crate::problem::Problem;
@@ -53,10 +53,16 @@ pub struct Estimates {
 }
 
 impl Estimates {
+    /// `prepared` is the first part of the certificate of the same solution, if it was made.
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "the same list as everywhere, and what is known of the certificate"
+    )]
     pub(crate) fn of(
         mesh: &Mesh,
         discrete: &DiscreteProblem,
         moments: Option<&Moments>,
+        prepared: Option<&Prepared>,
         solution: &Solution,
         problem: &Problem,
         settings: &Settings,
@@ -93,7 +99,16 @@ impl Estimates {
             None => None,
         };
         let certificate = match moments {
-            Some(moments) => Some(certified(discrete, moments, solution, problem, Grade::Rt0)?),
+            Some(moments) => {
+                let given = Given {
+                    threads: settings.solve.threads,
+                    ..given(problem, discrete, moments, solution)
+                };
+                Some(match prepared {
+                    Some(prepared) => prepared.certify(&given, POINCARE)?,
+                    None => certify(&given, Grade::Rt0, POINCARE)?,
+                })
+            }
             None => None,
         };
         let residual = sweep.residual;
@@ -157,33 +172,20 @@ impl Estimates {
         Ok(estimates)
     }
 
-    /// Certifies again by another grade; returns the quotient of the new bound and the old one, 1 where both vanish.
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "the same list as everywhere, and two switches"
-    )]
-    pub(crate) fn certify(
-        &mut self,
-        discrete: &DiscreteProblem,
-        moments: &Moments,
-        solution: &Solution,
-        problem: &Problem,
-        grade: Grade,
-        drives: bool,
-    ) -> Result<f64, FieldError> {
-        let new = certified(discrete, moments, solution, problem, grade)?;
+    /// Takes in a certificate; returns the quotient of the new bound and the old one, 1 where both vanish.
+    pub(crate) fn replace(&mut self, new: Certificate, solution: &Solution, drives: bool) -> f64 {
         let before = self.certificate.as_ref().map_or(0.0, |c| c.bound);
         let ratio = if before > 0.0 {
             new.bound / before
         } else {
             1.0
         };
-        if drives && grade == Grade::Rt0 {
+        if drives && new.grade == Grade::Rt0 {
             self.marking = squares(&new.local);
         }
         self.certificate = Some(new);
         self.judge(drives, solution.info.algebraic_error);
-        Ok(ratio)
+        ratio
     }
 
     /// What the bound, without its algebraic part, is of the cheap indicators on a level that has both.
@@ -241,17 +243,7 @@ pub(crate) fn bound_unit(estimator: Estimator, scale: Scale) -> i32 {
     }
 }
 
-/// eta_alg of a solution of a problem by itself.
-pub(crate) fn algebraic(
-    discrete: &DiscreteProblem,
-    moments: &Moments,
-    solution: &Solution,
-    problem: &Problem,
-) -> Result<f64, FieldError> {
-    estimate::algebraic(&given(problem, discrete, moments, solution))
-}
-
-/// What a certificate is made from.
+/// What a certificate is made from, on one thread.
 pub fn given<'a>(
     problem: &'a Problem,
     discrete: &'a DiscreteProblem,
@@ -267,20 +259,6 @@ pub fn given<'a>(
         tension_mean: &discrete.tension_mean,
         displacement: &solution.displacement,
         force: &solution.force,
+        threads: 1,
     }
-}
-
-/// The certificate of a solution of a problem.
-///
-/// # Errors
-/// A value of a load or a tension that is not finite.
-fn certified(
-    discrete: &DiscreteProblem,
-    moments: &Moments,
-    solution: &Solution,
-    problem: &Problem,
-    grade: Grade,
-) -> Result<Certificate, FieldError> {
-    let given = given(problem, discrete, moments, solution);
-    certify(&given, grade, POINCARE)
 }

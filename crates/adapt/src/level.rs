@@ -4,11 +4,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use contact::{DiscreteProblem, Solution, Start, Tolerance, Workspace};
-use estimate::{Grade, Moments};
+use estimate::certificate::POINCARE;
+use estimate::{Given, Grade, Moments, Prepared, certify};
 use fem_core::{Mesh, TriangleId, parallel};
 
-use crate::discretise::{Before, DataError, discretise, discretise_carried, moments_near};
-use crate::estimates::{self, Estimates};
+use crate::discretise::{Before, DataError, discretise, discretise_carried, moments_near, near};
+use crate::estimates::{Estimates, given};
+use crate::forecast::Forecast;
 use crate::output::memory::peak_memory_mb;
 use crate::problem::Problem;
 use crate::record::LevelRecord;
@@ -46,59 +48,8 @@ pub const SETTLED: f64 = 0.01;
 /// Predictions of eta and eta_alg may be so much too large.
 const AHEAD: f64 = 0.8;
 
-/// After several steps eta_alg is this part of what the quotient after a single one lets expect: the rough parts of the error go first.
-const LEAK: f64 = 0.125;
-
 /// An algebraic error up to so many times what was to be gone for is left as it is: eta_alg is looked at next in any case.
 const CLOSE: f64 = 1.5;
-
-/// From so many vertices on a run that the certificate drives goes by cheap indicators as long as its goal is far. Below, the certificate
-/// of all levels together takes a few milliseconds.
-const CHEAP_FROM: usize = 10_000;
-
-/// The quotient of the certificate and the cheap indicators is taken anew when the number of vertices has grown by this factor: all these
-/// certificates together cost an eighth of the last one.
-const RENEWED: usize = 8;
-
-/// What is known of the certificate before it is made.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Forecast {
-    /// Quotient of the bound and the cheap indicators where both were there last.
-    quotient: Option<f64>,
-    /// Vertices of that level.
-    vertices: usize,
-    /// Quotient of eta_alg and the algebraic error as estimated, over the root of the number of vertices: it grows like 1/h.
-    leak: Option<f64>,
-}
-
-impl Forecast {
-    /// Takes in a finished level.
-    pub fn see(&mut self, level: &Level) {
-        if let Some(quotient) = level.estimates.quotient() {
-            self.quotient = Some(quotient);
-            self.vertices = level.mesh.vertex_count();
-            let certificate = level.estimates.certificate.as_ref();
-            let algebraic = level.solution.info.algebraic_error.filter(|&e| e > 0.0);
-            self.leak = certificate.zip(algebraic).map(|(certificate, algebraic)| {
-                certificate.algebraic / algebraic / (self.vertices as f64).sqrt()
-            });
-        }
-    }
-
-    /// The algebraic error at which eta_alg is expected to be half of what it may be on a mesh where the error has this size.
-    fn settled(self, size: f64, mesh: &Mesh) -> Option<f64> {
-        let share = 0.5 * SETTLED * size;
-        self.leak
-            .map(|leak| share / (LEAK * leak * (mesh.vertex_count() as f64).sqrt()))
-    }
-
-    /// The quotient that a level is to be judged by instead of its certificate, if it is to be.
-    fn on(self, mesh: &Mesh) -> Option<f64> {
-        let vertices = mesh.vertex_count();
-        self.quotient
-            .filter(|_| vertices >= CHEAP_FROM && vertices < RENEWED * self.vertices)
-    }
-}
 
 /// How often a level is solved to a higher accuracy before its balance is given up.
 const ROUNDS: usize = 8;
@@ -222,6 +173,7 @@ impl Level {
             &mesh,
             &discrete,
             moments.as_ref(),
+            None,
             &solution,
             problem,
             settings,
@@ -271,18 +223,23 @@ impl Level {
                 return Ok(());
             };
             self.solve_on(context, goal, workspace)?;
-            self.estimate_again(context)?;
+            self.estimate_again(None, context)?;
         }
         Ok(())
     }
 
-    /// Estimates the present solution, and makes the record anew.
-    fn estimate_again(&mut self, context: Context<'_>) -> Result<(), LevelError> {
+    /// Estimates the present solution, and makes the record anew; `prepared` as for [`Estimates::of`].
+    fn estimate_again(
+        &mut self,
+        prepared: Option<&Prepared>,
+        context: Context<'_>,
+    ) -> Result<(), LevelError> {
         let clock = Instant::now();
         self.estimates = Estimates::of(
             &self.mesh,
             &self.discrete,
             self.moments.as_ref(),
+            prepared,
             &self.solution,
             context.problem,
             context.settings,
@@ -314,23 +271,25 @@ impl Level {
         Ok(())
     }
 
-    /// Makes the certificate that was left out, for a level that may be the last or whose goal is near, after the steps that bring its
+    /// Makes the certificate that was left out. For a level that may be the last or whose goal is near, which `settled` says, after the steps that bring its
     /// algebraic part down to where it is settled as far as that can be foreseen.
     pub(crate) fn certify(
         &mut self,
         context: Context<'_>,
         forecast: Forecast,
+        settled: bool,
         workspace: &mut Workspace,
     ) -> Result<(), LevelError> {
         let Context {
             problem, settings, ..
         } = context;
+        let settled = settled && settings.solve.tolerance == Tolerance::Balanced;
         let size = self.estimates.error_size;
         let goal = size.and_then(|size| forecast.settled(size, &self.mesh));
         let mut estimated = true;
         let info = &self.solution.info;
         if let (Some(goal), Some(algebraic)) = (goal, info.algebraic_error)
-            && settings.solve.tolerance == Tolerance::Balanced
+            && settled
             && algebraic > CLOSE * goal
         {
             self.solve_on(context, goal, workspace)?;
@@ -340,7 +299,8 @@ impl Level {
         let mut moments = moments_near(problem, &self.discrete, &self.solution.force)?;
         self.forecast = None;
         self.record.seconds_assemble += clock.elapsed().as_secs_f64();
-        // eta_alg by itself is cheap: what is missing is made up for before the certificate.
+        // The part that tells eta_alg is cheap: what is missing is made up for before the rest.
+        let mut prepared = None;
         for _ in 0..ROUNDS {
             let (Some(size), Some(algebraic)) = (
                 self.estimates.error_size,
@@ -349,25 +309,36 @@ impl Level {
                 break;
             };
             let clock = Instant::now();
-            let found = estimates::algebraic(&self.discrete, &moments, &self.solution, problem)?;
+            let first = Prepared::of(&self.given(&moments, context))?;
+            let found = first.algebraic();
             self.record.seconds_estimate += clock.elapsed().as_secs_f64();
             let share = AHEAD * SETTLED * size;
-            if settings.solve.tolerance != Tolerance::Balanced || found <= share {
+            if !settled || found <= share {
+                prepared = Some(first);
                 break;
             }
             self.solve_on(context, AHEAD * algebraic * share / found, workspace)?;
             estimated = false;
             let (load, tension) = (problem.loads(), problem.tensions());
-            moments.cover(&self.mesh, load, tension, Some(&self.solution.force))?;
+            let near = near(&self.discrete, &self.solution.force);
+            moments.cover(&self.mesh, load, tension, Some(near))?;
         }
         self.moments = Some(moments);
         if estimated {
-            self.add_certificate(Grade::Rt0, context)?;
+            self.add_certificate(Grade::Rt0, prepared.as_ref(), context)?;
         } else {
-            self.estimate_again(context)?;
+            self.estimate_again(prepared.as_ref(), context)?;
         }
         self.stamp(context);
         Ok(())
+    }
+
+    /// What a certificate of this level is made from.
+    fn given<'a>(&'a self, moments: &'a Moments, context: Context<'a>) -> Given<'a> {
+        Given {
+            threads: context.settings.solve.threads,
+            ..given(context.problem, &self.discrete, moments, &self.solution)
+        }
     }
 
     /// Iterates until eta_alg too is a small part of the certificate; for a level that may be the last.
@@ -396,28 +367,29 @@ impl Level {
             moments.cover(&self.mesh, problem.loads(), problem.tensions(), None)?;
             self.record.seconds_assemble += clock.elapsed().as_secs_f64();
         }
-        let ratio = self.add_certificate(Grade::Rt1, context)?;
+        let ratio = self.add_certificate(Grade::Rt1, None, context)?;
         self.stamp(context);
         Ok(ratio)
     }
 
     /// Makes a certificate of the present solution beside the other estimates; the quotient of the new bound and the one before.
-    fn add_certificate(&mut self, grade: Grade, context: Context<'_>) -> Result<f64, LevelError> {
-        let Context {
-            problem, settings, ..
-        } = context;
+    fn add_certificate(
+        &mut self,
+        grade: Grade,
+        prepared: Option<&Prepared>,
+        context: Context<'_>,
+    ) -> Result<f64, LevelError> {
         let Some(moments) = &self.moments else {
             return Ok(1.0);
         };
         let clock = Instant::now();
-        let ratio = self.estimates.certify(
-            &self.discrete,
-            moments,
-            &self.solution,
-            problem,
-            grade,
-            settings.estimate.estimator == Estimator::Certified,
-        )?;
+        let given = self.given(moments, context);
+        let new = match prepared {
+            Some(prepared) => prepared.certify(&given, POINCARE)?,
+            None => certify(&given, grade, POINCARE)?,
+        };
+        let drives = context.settings.estimate.estimator == Estimator::Certified;
+        let ratio = self.estimates.replace(new, &self.solution, drives);
         self.renew(context)?;
         self.record.seconds_estimate += clock.elapsed().as_secs_f64();
         Ok(ratio)

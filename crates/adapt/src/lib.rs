@@ -3,7 +3,7 @@
 //! - [`mod@run`]: the loop itself, its reasons to stop and the [`Observer`] trait;
 //! - [`level`]: one level: mesh, discrete problem, solution, estimates, and the step to the next;
 //! - [`mod@discretise`]: from the data to the discrete problem on a mesh;
-//! - [`estimates`]: indicators, errors and bounds of a level;
+//! - [`estimates`]: indicators, errors and bounds of a level; `forecast`: what is known of a certificate before it is made;
 //! - [`assurance`]: what the certificate holds for, in words;
 //! - [`mod@mark`]: which triangles are refined;
 //! - [`problem`], [`settings`]: what goes in; [`record`]: the numbers that come out of a level;
@@ -12,6 +12,7 @@
 pub mod assurance;
 pub mod discretise;
 pub mod estimates;
+mod forecast;
 pub mod level;
 pub mod mark;
 pub mod output;

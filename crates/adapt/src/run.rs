@@ -8,7 +8,8 @@ use fem_core::{FieldError, Mesh, MeshError, Scale, parallel};
 
 use crate::discretise::DataError;
 use crate::estimates::bound_unit;
-use crate::level::{Context, Forecast, Level};
+use crate::forecast::Forecast;
+use crate::level::{Context, Level};
 use crate::mark::mark;
 use crate::output::OutputError;
 use crate::problem::Problem;
@@ -117,10 +118,11 @@ fn finish(
     let sharp = settings.estimate.last == Final::Sharp;
     let factor = if drives && sharp { *sharpness } else { 1.0 };
     if level.estimates.certificate.is_none() {
-        if reason(level, NEAR * factor * level.estimates.reachable).is_none() {
+        let near = reason(level, NEAR * factor * level.estimates.reachable).is_some();
+        if !near && !forecast.is_old(&level.mesh) {
             return Ok(None);
         }
-        level.certify(context, forecast, workspace)?;
+        level.certify(context, forecast, near, workspace)?;
     }
     if reason(level, factor * level.estimates.reachable).is_none() {
         return Ok(None);

@@ -36,7 +36,7 @@ pub mod sweep;
 
 pub use action::{extend_to_boundary, nodal_action};
 pub use certificate::{
-    BoundaryOscillation, Certificate, Given, Grade, Moments, algebraic, boundary_oscillation,
+    BoundaryOscillation, Certificate, Given, Grade, Moments, Near, Prepared, boundary_oscillation,
     certify,
 };
 pub use contact_set::{ContactSet, contact_set};

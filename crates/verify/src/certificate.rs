@@ -122,6 +122,7 @@ pub(crate) fn certificate(
         tension_mean: &level.tension,
         displacement: &level.displacement,
         force: &level.force,
+        threads: 1,
     };
     let found = certify(&given, grade(settings, place), POINCARE)?;
     let exponent = level.scale.energy_norm();

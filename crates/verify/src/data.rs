@@ -1,7 +1,7 @@
 //! The scene's data on the mesh of a level, and the discrete solution of its file, all scaled.
 
 use adapt::Problem;
-use estimate::Moments;
+use estimate::{Moments, Near};
 use fem_core::integrate::{Loads, Reference, load_pair_relative_to, means};
 use fem_core::scale::times_power_of_two;
 use fem_core::{ElementValues, Field, FieldError, Mesh, Samples, Scale};
@@ -70,15 +70,20 @@ impl<'a> Discrete<'a> {
         let load = problem.loads();
         let reference = Reference::of(&problem.mesh, load)?;
         let tension = problem.tensions();
+        let loads = load_pair_relative_to(&reference, mesh, load, 1)?;
+        let near = Near {
+            force: &nodal.force,
+            loads: &loads,
+        };
         let moments = certified
-            .then(|| Moments::near(&reference, mesh, load, tension, &nodal.force))
+            .then(|| Moments::near(&reference, mesh, load, tension, near))
             .transpose()?;
         let pair = |fields: &[std::sync::Arc<dyn Field>; 2]| {
             Ok::<_, FieldError>([means(mesh, &*fields[0])?, means(mesh, &*fields[1])?])
         };
         Ok(Discrete {
             tension: pair(&problem.tension)?,
-            loads: load_pair_relative_to(&reference, mesh, load, 1)?,
+            loads,
             heights: [
                 heights(mesh, &*problem.height[0])?,
                 heights(mesh, &*problem.height[1])?,

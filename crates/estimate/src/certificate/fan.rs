@@ -1,6 +1,6 @@
 //! The triangles around every vertex, counter-clockwise.
 
-use fem_core::{Mesh, TriangleId};
+use fem_core::{Mesh, Neighbour, TriangleId};
 
 /// A triangle seen from one of its corners.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -23,6 +23,26 @@ impl Corner {
     pub fn corner(self) -> usize {
         usize::from(self.local)
     }
+}
+
+/// The corner after one in its triangle.
+const NEXT: [usize; 3] = [1, 2, 0];
+
+/// The next corner around the same vertex counter-clockwise, if the boundary is not between.
+#[inline(always)]
+pub(super) fn after(neighbours: &[[Neighbour; 3]], at: Corner) -> Option<Corner> {
+    // The second edge lies opposite to the next corner.
+    let (TriangleId(triangle), face) = neighbours[at.index()][NEXT[at.corner()]].get()?;
+    let local = NEXT[face] as u8;
+    Some(Corner { triangle, local })
+}
+
+/// The next corner clockwise.
+#[inline]
+pub(super) fn before(neighbours: &[[Neighbour; 3]], at: Corner) -> Option<Corner> {
+    let (TriangleId(triangle), face) = neighbours[at.index()][NEXT[NEXT[at.corner()]]].get()?;
+    let local = NEXT[NEXT[face]] as u8;
+    Some(Corner { triangle, local })
 }
 
 /// The triangles around a vertex, in counter-clockwise order. The first edge of a triangle leads from the vertex to the next corner, its
@@ -68,17 +88,12 @@ impl Fan {
         let mut at = first;
         loop {
             self.corners.push(at);
-            match mesh.neighbours()[at.index()][(at.corner() + 1) % 3].get() {
+            match after(mesh.neighbours(), at) {
                 None => {
                     self.closed = false;
                     return;
                 }
-                Some((TriangleId(triangle), face)) => {
-                    at = Corner {
-                        triangle,
-                        local: ((face + 1) % 3) as u8,
-                    };
-                }
+                Some(next) => at = next,
             }
             if at == first {
                 self.closed = true;
@@ -107,6 +122,8 @@ mod tests {
                     let end =
                         |c: Corner, k: usize| mesh.triangles()[c.index()][(c.corner() + k) % 3];
                     assert_eq!(end(pair[0], 2), end(pair[1], 1));
+                    assert_eq!(after(mesh.neighbours(), pair[0]), Some(pair[1]));
+                    assert_eq!(before(mesh.neighbours(), pair[1]), Some(pair[0]));
                 }
                 for corner in &fan.corners {
                     visits[corner.index()][corner.corner()] += 1;

@@ -5,117 +5,16 @@ use fem_core::integrate::{
     squared_error,
 };
 use fem_core::quadrature::{POINTS, affine_misfit};
-use fem_core::{FieldError, Mesh, Samples, TriangleId};
+use fem_core::{FieldError, Samples, TriangleId};
 
+use super::action::contact_action;
+use super::closed::{Fit, affine_on_cells};
 use super::dual_rule::DualRule;
-
-use super::fan::Corner;
-use super::moments::{Moments, contact_action};
+use super::fast::Roughs;
+use super::moments::Moments;
+use super::reconstruction::{Norms, Reconstruction};
 use super::shares::{SIGN, Shares};
 use super::{Given, POINCARE};
-
-/// Products of the two edges a, b that leave a corner counter-clockwise, and the area of the element.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
-    pub aa: f64,
-    pub ab: f64,
-    pub bb: f64,
-    pub area: f64,
-}
-
-/// A frame with the normal of its first edge.
-pub(super) struct CornerFrame {
-    pub products: Frame,
-    /// The first edge turned by a right angle counter-clockwise: its normal times its length.
-    pub first_normal: [f64; 2],
-}
-
-impl Frame {
-    /// The frame of a corner.
-    #[inline]
-    pub fn of(mesh: &Mesh, corner: Corner) -> CornerFrame {
-        let v = mesh.triangles()[corner.index()];
-        let k = corner.corner();
-        let [p, q, r] = [0, 1, 2].map(|l| mesh.points()[v[(k + l) % 3].index()]);
-        let a = [q[0] - p[0], q[1] - p[1]];
-        let b = [r[0] - p[0], r[1] - p[1]];
-        CornerFrame {
-            products: Frame {
-                aa: a[0] * a[0] + a[1] * a[1],
-                ab: a[0] * b[0] + a[1] * b[1],
-                bb: b[0] * b[0] + b[1] * b[1],
-                area: 0.5 * (a[0] * b[1] - a[1] * b[0]),
-            },
-            first_normal: [-a[1], a[0]],
-        }
-    }
-}
-
-/// The sum over the three pairs of (p_k - p_l)^2.
-#[inline]
-pub(super) fn pairs(p: [f64; 3]) -> f64 {
-    let d = [p[0] - p[1], p[1] - p[2], p[2] - p[0]];
-    d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-}
-
-/// What the two grades have to tell about their fluxes.
-pub(super) trait Reconstruction {
-    /// ||f_i +- lambda_h - r_i - div s_i||_K^2 where loads and tensions are constant in the element.
-    fn uniform_remainder(
-        &self,
-        triangle: usize,
-        membrane: usize,
-        area: f64,
-        shares: &Shares,
-    ) -> f64;
-
-    /// Whether the divergence of s_i lacks the parts +-kappa_j - rho_ij/|D_j| of the dual cells, which else cancel in the remainder.
-    fn lacks_cells(&self) -> bool;
-
-    /// The part of the divergence of s_i that is constant on the share of every dual cell.
-    fn on_cells(&self, triangle: usize, membrane: usize) -> [f64; 3];
-
-    /// The part of the divergence of s_i that is affine in the element: its values at the corners, if there is one.
-    fn affine(&self, triangle: usize, membrane: usize) -> Option<[f64; 3]>;
-
-    /// s_i + mu_iK grad u_ih at points of a part of the element, given by their barycentric coordinates.
-    fn tau(
-        &self,
-        triangle: usize,
-        membrane: usize,
-        part: usize,
-        at: &[[f64; 3]; POINTS],
-    ) -> [[f64; 2]; POINTS];
-}
-
-/// The two norms on every element, squared: misfit (with the weight 1/mu_i) and remainder, for both membranes.
-#[derive(Clone, Copy, Default, Debug)]
-pub(super) struct Norms {
-    pub misfit: [f64; 2],
-    pub remainder: [f64; 2],
-}
-
-impl Norms {
-    /// The closed forms; of the remainder only where the data are constant in the element.
-    #[inline]
-    pub fn uniform(
-        given: &Given<'_>,
-        shares: &Shares,
-        squares: &[[f64; 2]],
-        fluxes: &dyn Reconstruction,
-        t: usize,
-        area: f64,
-    ) -> Norms {
-        let mut norms = Norms::default();
-        for i in 0..2 {
-            norms.misfit[i] = squares[t][i] / given.tension_mean[i][t];
-            if given.moments.uniform(given.loads, t) {
-                norms.remainder[i] = fluxes.uniform_remainder(t, i, area, shares);
-            }
-        }
-        norms
-    }
-}
 
 /// Accuracy of the integrals along jumps: a cut piece may be wrong by this part of the whole.
 const CONTROL: Control = Control {
@@ -179,10 +78,54 @@ pub(super) fn norms(
         fluxes,
         varying,
         rule: DualRule::new(),
+        place: None,
         exact,
         known,
         reference,
         norms,
+    };
+    integrate(mesh, CONTROL, &mut sampled)?;
+    Ok(sampled.norms)
+}
+
+/// Evaluates the remainders of some elements by quadrature, in their order; the tensions are constants. `misfit` is the sum of the squared misfits of all
+/// elements, which jumps are compared with.
+pub(super) fn sampled_remainders(
+    given: &Given<'_>,
+    shares: &Shares,
+    roughs: &Roughs,
+    misfit: f64,
+) -> Result<Vec<Norms>, FieldError> {
+    let mesh = given.mesh;
+    let mut known = vec![true; mesh.triangle_count()];
+    let place = roughs.all().iter().map(|rough| rough.triangle).collect();
+    let exact: Vec<Norms> = roughs
+        .all()
+        .iter()
+        .map(|rough| {
+            known[rough.triangle] = false;
+            Norms {
+                misfit: rough.misfit,
+                ..Norms::default()
+            }
+        })
+        .collect();
+    let mut sampled = Sampled {
+        given,
+        moments: given.moments,
+        shares,
+        flux: &[],
+        fluxes: roughs,
+        varying: [false; 2],
+        rule: DualRule::new(),
+        place: Some(place),
+        norms: exact.clone(),
+        exact,
+        known,
+        reference: Some(Reference {
+            area: fem_core::norms::area(mesh),
+            magnitude: [misfit, 0.0],
+        }),
     };
     integrate(mesh, CONTROL, &mut sampled)?;
     Ok(sampled.norms)
@@ -200,40 +143,24 @@ fn smooth_remainder(
     area: f64,
 ) -> Option<[f64; 2]> {
     let v = given.mesh.triangles()[t].map(|j| j.index());
-    if v.iter().any(|&j| shares.theta[j] != 0.0) {
+    if v.iter().any(|&j| shares[j].theta != 0.0) {
         return None;
     }
     let mut squares = [0.0; 2];
     for i in 0..2 {
-        let hats = given.loads[i].moments(t, area).map(|m| m / area);
-        let mean = hats[0] + hats[1] + hats[2];
-        // The inverse of the mass matrix.
-        let slope = hats.map(|m| 12.0 * m - 4.0 * mean);
-        let affine_part = area / 12.0 * slope.iter().map(|d| d * d).sum::<f64>();
-        let bent = (given.loads[i].deviation_squared(t) - affine_part).max(0.0);
+        let hats = given.loads[i].moments(t, area);
+        let fit = Fit::of(hats, given.loads[i].deviation_squared(t), area);
         let affine = fluxes.affine(t, i).unwrap_or([0.0; 3]);
         let constants = constants(fluxes, shares, t, i, v);
-        let fit = [0, 1, 2].map(|k| mean + slope[k] - affine[k]);
-        let square = on_cells_squared(fit, constants, area);
-        if bent > SMOOTH * SMOOTH * square {
+        let corners = fit.corners();
+        let left = [0, 1, 2].map(|k| corners[k] - affine[k]);
+        let square = affine_on_cells(left, constants, area);
+        if fit.bent > SMOOTH * SMOOTH * square {
             return None;
         }
-        squares[i] = (square.sqrt() + bent.sqrt()).powi(2);
+        squares[i] = (square.sqrt() + fit.bent.sqrt()).powi(2);
     }
     Some(squares)
-}
-
-/// ||p - sum_k c_k chi_Dk||^2 on an element, for an affine function p by its values at the corners.
-fn on_cells_squared(p: [f64; 3], c: [f64; 3], area: f64) -> f64 {
-    let mean = (p[0] + p[1] + p[2]) / 3.0;
-    let (p, c) = (p.map(|p| p - mean), c.map(|c| c - mean));
-    let mut sum = 0.0;
-    for k in 0..3 {
-        // The integrals of the hat functions over D_k are 22/108 and 7/108 of the area; the values of p sum to zero.
-        let across = 15.0 / 108.0 * p[k];
-        sum += p[k] * p[k] / 12.0 - 2.0 * c[k] * across + c[k] * c[k] / 3.0;
-    }
-    area * sum.max(0.0)
 }
 
 /// What of the divergence of s_i (and of the action and the residual) is constant on the shares of the dual cells.
@@ -247,7 +174,7 @@ fn constants(
     let mut constants = fluxes.on_cells(t, i);
     if fluxes.lacks_cells() {
         for (c, j) in constants.iter_mut().zip(corners) {
-            *c -= shares.cell(i, j);
+            *c -= shares[j].cell.0[i];
         }
     }
     constants
@@ -263,9 +190,11 @@ struct Sampled<'a> {
     /// Which tensions vary.
     varying: [bool; 2],
     rule: DualRule,
+    /// The elements that `exact` and `norms` are of, increasing; all of them if there is no list.
+    place: Option<Vec<usize>>,
     /// Closed forms, where they hold.
     exact: Vec<Norms>,
-    /// Where both norms are known without samples.
+    /// Where both norms are known without samples, for all elements.
     known: Vec<bool>,
     /// What jumps are relative to: the whole, which is more than the elements that are sampled.
     reference: Option<Reference>,
@@ -279,19 +208,29 @@ struct Remainder {
 }
 
 impl Sampled<'_> {
+    /// Where an element is in `exact` and `norms`.
+    #[inline]
+    fn place(&self, t: usize) -> usize {
+        match &self.place {
+            None => t,
+            Some(all) => all.binary_search(&t).unwrap_or_else(|next| next),
+        }
+    }
+
     /// f_i +- lambda_h - r_i - div s_i: what is sampled at the points of a piece, and what is constant on the dual cells.
     fn remainder(&self, piece: &Piece<'_>, i: usize) -> Remainder {
         let t = piece.triangle;
         let v = self.given.mesh.triangles()[t].map(|j| j.index());
         let constants = constants(self.fluxes, self.shares, t, i, v);
-        let share = v.map(|j| SIGN[i] * self.shares.theta[j]);
+        let share = v.map(|j| SIGN[i] * self.shares[j].theta);
         let (load, action) = (piece.values(i), piece.values(ACTION));
         let affine = self.fluxes.affine(t, i).unwrap_or([0.0; 3]);
+        let fitted = self.fluxes.action(t);
         let mut samples = [0.0; POINTS];
         for (k, at) in piece.at.iter().enumerate() {
-            let theta = at[0] * share[0] + at[1] * share[1] + at[2] * share[2];
-            let divergence = at[0] * affine[0] + at[1] * affine[1] + at[2] * affine[2];
-            samples[k] = load[k] + theta * action[k] - divergence;
+            let value = |v: [f64; 3]| at[0] * v[0] + at[1] * v[1] + at[2] * v[2];
+            let action = fitted.map_or(action[k], value);
+            samples[k] = load[k] + value(share) * action - value(affine);
         }
         Remainder { samples, constants }
     }
@@ -351,7 +290,7 @@ impl Sampled<'_> {
 
     /// What the closed form of the misfit says of a piece.
     fn share_of_misfit(&self, piece: &Piece<'_>) -> f64 {
-        let [first, second] = self.exact[piece.triangle].misfit;
+        let [first, second] = self.exact[self.place(piece.triangle)].misfit;
         let area = self
             .given
             .mesh
@@ -472,7 +411,8 @@ impl Integrand for Sampled<'_> {
     }
 
     fn clear(&mut self, t: usize) {
-        let norms = &mut self.norms[t];
+        let place = self.place(t);
+        let norms = &mut self.norms[place];
         if !self.moments.uniform(self.given.loads, t) {
             norms.remainder = [0.0; 2];
         }
@@ -483,13 +423,14 @@ impl Integrand for Sampled<'_> {
 
     fn add(&mut self, piece: &Piece<'_>) {
         let t = piece.triangle;
+        let place = self.place(t);
         for i in 0..2 {
             if !self.moments.uniform(self.given.loads, t) {
-                self.norms[t].remainder[i] += self.judged_remainder(piece, i).0;
+                self.norms[place].remainder[i] += self.judged_remainder(piece, i).0;
             }
             if self.varying[i] {
                 let [x, y] = self.misfit(piece, i);
-                self.norms[t].misfit[i] += sum(piece, &x) + sum(piece, &y);
+                self.norms[place].misfit[i] += sum(piece, &x) + sum(piece, &y);
             }
         }
     }

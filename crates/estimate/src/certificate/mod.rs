@@ -12,25 +12,37 @@
 //! rho_ij chi_Dj/|D_j|, d is the width of the domain, and C_K = h_K/3.8317 the sharp constant of Poincare's inequality
 //! on triangles (j_11, the first zero of the Bessel function J_1; Laugesen, Siudeja 2010). Nothing is assumed of the solver.
 //!
-//! The steps: moments of the data, shares of the forces (`shares`), fluxes of one of two grades (`rt0`, `rt1`), norms.
+//! The steps: moments of the data, shares of the forces (`shares`), fluxes of one of two grades (`rt0`, `rt1`), norms (`misfit`). With constant tensions the first
+//! grade has all of it in one pass over blocks of triangles (`blocks`, `fast`), and keeps nothing of an element but its own part of the bound.
 
+mod action;
+mod blocks;
 mod boundary;
+mod closed;
+mod data;
 mod dual_rule;
+mod element;
 mod fan;
+mod fast;
+mod frame;
 mod misfit;
 mod moments;
+mod reconstruction;
 mod ring;
 mod rt0;
 mod rt1;
 mod shares;
 
 use fem_core::integrate::Loads;
-use fem_core::{ElementValues, Field, FieldError, Mesh};
+use fem_core::{ElementValues, Field, FieldError, Mesh, TriangleId};
 
+use action::Action;
 pub use boundary::{BoundaryOscillation, boundary_oscillation};
-use misfit::{Norms, Reconstruction, norms};
-pub use moments::{JUMP, Moments};
-use shares::Shares;
+use data::{General, Loaded, Plain};
+use misfit::norms;
+pub use moments::{JUMP, Moments, Near};
+use reconstruction::{Norms, Reconstruction};
+use shares::{Share, Shares};
 
 /// How the fluxes are reconstructed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -63,6 +75,8 @@ pub struct Given<'a> {
     pub displacement: &'a [Vec<f64>; 2],
     /// Action forces; what is negative counts as 0.
     pub force: &'a [f64],
+    /// At most so many threads; the number does not show.
+    pub threads: usize,
 }
 
 impl Given<'_> {
@@ -110,30 +124,66 @@ fn bound(eta: f64, contact: f64) -> f64 {
 /// # Errors
 /// A value of a load or a tension that is not finite.
 pub fn certify(given: &Given<'_>, grade: Grade, poincare: f64) -> Result<Certificate, FieldError> {
-    let mut room = None;
-    let given = &covered(given, grade, &mut room)?;
-    let (shares, flux) = Shares::of(given);
     match grade {
-        Grade::Rt0 => {
-            let (fluxes, squares) = rt0::equilibrate(given, &shares, &flux);
-            summed(given, grade, poincare, &shares, &flux, &squares, &fluxes)
-        }
+        Grade::Rt0 => Prepared::of(given)?.certify(given, poincare),
         Grade::Rt1 => {
+            let mut room = None;
+            let given = &covered(given, grade, &mut room)?;
+            let shares = Shares::of(given, &General(given));
+            let flux = fluxes(given);
             let (fluxes, squares) = rt1::equilibrate(given, &shares, &flux);
             summed(given, grade, poincare, &shares, &flux, &squares, &fluxes)
         }
     }
 }
 
-/// eta_alg of the certificate by itself; O(N), and far cheaper than the rest.
-///
-/// # Errors
-/// A value of a load that is not finite.
-pub fn algebraic(given: &Given<'_>) -> Result<f64, FieldError> {
-    let mut room = None;
-    let given = &covered(given, Grade::Rt0, &mut room)?;
-    let low = [0, 1].map(|i| given.moments.stiffness_low[i].least());
-    Ok(Shares::of(given).0.algebraic(given.mesh, low))
+/// The first part of a certificate of grade [`Grade::Rt0`], which tells eta_alg, and far cheaper than the rest.
+pub struct Prepared {
+    shares: Shares,
+    /// Moments that lack nothing, where those given did.
+    moments: Option<Moments>,
+}
+
+impl Prepared {
+    /// Divides the forces and evaluates the residuals of the rows; O(N).
+    ///
+    /// # Errors
+    /// A value of a load that is not finite.
+    pub fn of(given: &Given<'_>) -> Result<Prepared, FieldError> {
+        let mut moments = None;
+        let given = &covered(given, Grade::Rt0, &mut moments)?;
+        let shares = match (Plain::of(given), Loaded::of(given)) {
+            (Some(data), _) => Shares::of(given, &data),
+            (None, Some(data)) => Shares::of(given, &data),
+            (None, None) => Shares::of(given, &General(given)),
+        };
+        Ok(Prepared { shares, moments })
+    }
+
+    /// eta_alg, in the unit of the energy norm.
+    pub fn algebraic(&self) -> f64 {
+        self.shares.algebraic
+    }
+
+    /// The certificate of what this was prepared from; O(N).
+    ///
+    /// # Errors
+    /// A value of a load or a tension that is not finite.
+    pub fn certify(&self, given: &Given<'_>, poincare: f64) -> Result<Certificate, FieldError> {
+        let moments = self.moments.as_ref().unwrap_or(given.moments);
+        let given = &Given { moments, ..*given };
+        let shares = &self.shares;
+        if let Some(data) = Plain::of(given) {
+            return fast::certify(given, &data, shares, poincare);
+        }
+        if let Some(data) = Loaded::of(given) {
+            return fast::certify(given, &data, shares, poincare);
+        }
+        let (fluxes, squares) = rt0::equilibrate(given, &General(given), shares);
+        let flux = self::fluxes(given);
+        let grade = Grade::Rt0;
+        summed(given, grade, poincare, shares, &flux, &squares, &fluxes)
+    }
 }
 
 /// The same with moments that lack nothing that a grade wants: made in `room`, unless they are there.
@@ -142,13 +192,32 @@ fn covered<'a>(
     grade: Grade,
     room: &'a mut Option<Moments>,
 ) -> Result<Given<'a>, FieldError> {
-    let force = (grade == Grade::Rt0).then_some(given.force);
-    if given.moments.missing(given.mesh, force).is_empty() {
+    let near = (grade == Grade::Rt0).then_some(Near {
+        force: given.force,
+        loads: given.loads,
+    });
+    let (mesh, tension) = (given.mesh, given.tension);
+    if given.moments.missing(mesh, tension, near).is_empty() {
         return Ok(*given);
     }
     let moments = room.insert(given.moments.clone());
-    moments.cover(given.mesh, given.load, given.tension, force)?;
+    moments.cover(mesh, given.load, tension, near)?;
     Ok(Given { moments, ..*given })
+}
+
+/// The fluxes mu_iK grad u_ih of every element.
+fn fluxes(given: &Given<'_>) -> Vec<[[f64; 2]; 2]> {
+    let mesh = given.mesh;
+    let of = |id: TriangleId| {
+        let v = mesh.triangles()[id.index()].map(|j| j.index());
+        let shape = mesh.shape(id);
+        [0, 1].map(|i| {
+            let g = shape.gradient(v.map(|j| given.displacement[i][j]));
+            let mu = given.tension_mean[i][id.index()];
+            [mu * g[0], mu * g[1]]
+        })
+    };
+    mesh.triangle_ids().map(of).collect()
 }
 
 /// Norms and sums over the elements.
@@ -180,28 +249,45 @@ fn summed(
             let low = moments.stiffness_low[i].at(t);
             own += (misfit[i].sqrt() + constant * (remainder[i] / low).sqrt()).powi(2);
         }
-        let overlap = contact_term(given, moments, shares, t, shape.area);
+        let v = mesh.triangles()[t].map(|j| j.index());
+        let overlap = contact_term(given, shares, v, shape.area, moments.action(t));
         square += own;
         contact += overlap;
         local.push((own + overlap).sqrt());
     }
-    let low = [0, 1].map(|i| moments.stiffness_low[i].least());
-    let eta = square.sqrt();
-    let algebraic = shares.algebraic(mesh, low);
-    Ok(Certificate {
+    Ok(finished(given, grade, shares, local, square, contact))
+}
+
+/// The certificate from its sums: eta^2 and C.
+fn finished(
+    given: &Given<'_>,
+    grade: Grade,
+    shares: &Shares,
+    local: Vec<f64>,
+    square: f64,
+    contact: f64,
+) -> Certificate {
+    let (eta, algebraic) = (square.sqrt(), shares.algebraic);
+    Certificate {
         grade,
         local,
         eta,
         contact,
         algebraic,
         bound: bound(eta + algebraic, contact),
-        jumps: moments.jumps,
-    })
+        jumps: given.moments.jumps,
+    }
 }
 
 /// int_K lambda_h (u_1h - u_2h): (lambda* theta, w) from the moments, and 11|K|/54, 7|K|/108 for the hat functions on a dual cell.
-fn contact_term(given: &Given<'_>, moments: &Moments, shares: &Shares, t: usize, area: f64) -> f64 {
-    let v = given.mesh.triangles()[t].map(|j| j.index());
+#[inline]
+fn contact_term(
+    given: &Given<'_>,
+    shares: &Shares,
+    v: [usize; 3],
+    area: f64,
+    action: Action<'_>,
+) -> f64 {
     let gap = v.map(|j| given.gap(j));
     if gap == [0.0; 3] {
         return 0.0;
@@ -209,11 +295,9 @@ fn contact_term(given: &Given<'_>, moments: &Moments, shares: &Shares, t: usize,
     let all: f64 = gap.iter().sum();
     let mut sum = 0.0;
     for k in 0..3 {
-        let (theta, kappa) = (shares.theta[v[k]], shares.kappa[v[k]]);
+        let Share { theta, kappa, .. } = shares[v[k]];
         if theta > 0.0 {
-            let part: f64 = (0..3)
-                .map(|l| moments.action_product(t, area, k, l) * gap[l])
-                .sum();
+            let part: f64 = (0..3).map(|l| action.product(area, k, l) * gap[l]).sum();
             sum += theta * part;
         }
         if kappa > 0.0 {

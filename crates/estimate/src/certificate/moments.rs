@@ -8,16 +8,10 @@ use fem_core::integrate::{
     Integrand, Judgement, LOAD_CONTROL, Loads, Piece, Reference, integrate, judge_load,
 };
 use fem_core::quadrature::affine_fit;
-use fem_core::{Field, FieldError, Mesh, Samples};
+use fem_core::{Field, FieldError, Mesh, Samples, TriangleId};
 
-/// Integrals against the products phi_0^2, phi_1^2, phi_2^2, phi_1 phi_2, phi_2 phi_0, phi_0 phi_1 of the hat functions of an element.
-type Products = [f64; 6];
-
-/// Position of phi_k phi_l in [`Products`].
-#[inline]
-fn product(k: usize, l: usize) -> usize {
-    if k == l { k } else { 6 - k - l }
-}
+use super::action::{Action, Products, affine_action, contact_action, product};
+use super::element::Pair;
 
 /// Where the moments of an element are among those that are kept.
 #[derive(Clone, Debug)]
@@ -92,13 +86,13 @@ pub struct Moments {
 /// Quotient of the largest and the smallest sample of a tension in an element that counts as a jump inside.
 pub const JUMP: f64 = 10.0;
 
-/// The action inside contact.
-#[inline]
-pub(super) fn contact_action(tension: [f64; 2], load: [f64; 2]) -> f64 {
-    let [m1, m2] = tension;
-    // Written so that no product of tension and load can leave the range.
-    let (first, second) = (m1 / (m1 + m2), m2 / (m1 + m2));
-    (first * load[1] - second * load[0]).max(0.0)
+/// What tells where the action matters.
+#[derive(Clone, Copy)]
+pub struct Near<'a> {
+    /// Action forces, one a vertex.
+    pub force: &'a [f64],
+    /// What the discrete problem knows of the loads, from the same points as the moments.
+    pub loads: &'a [Loads; 2],
 }
 
 impl Moments {
@@ -137,9 +131,9 @@ impl Moments {
         mesh: &Mesh,
         load: [&dyn Field; 2],
         tension: [&dyn Field; 2],
-        force: &[f64],
+        near: Near<'_>,
     ) -> Result<Moments, FieldError> {
-        Moments::made(reference, mesh, load, tension, Some(force))
+        Moments::made(reference, mesh, load, tension, Some(near))
     }
 
     fn made(
@@ -147,18 +141,18 @@ impl Moments {
         mesh: &Mesh,
         load: [&dyn Field; 2],
         tension: [&dyn Field; 2],
-        force: Option<&[f64]>,
+        near: Option<Near<'_>>,
     ) -> Result<Moments, FieldError> {
         let mut moments = Moments::empty(reference, mesh, load, tension);
         if moments.complete {
             moments.sample(mesh, load, tension, |_| true)?;
         } else {
-            moments.cover(mesh, load, tension, force)?;
+            moments.cover(mesh, load, tension, near)?;
         }
         Ok(moments)
     }
 
-    /// Integrates over the elements that these action forces make matter and that were not sampled yet, which is what [`super::Grade::Rt0`] needs; without
+    /// Integrates over the elements that action forces make matter and that were not sampled yet, which is what [`super::Grade::Rt0`] needs; without
     /// forces over all, for [`super::Grade::Rt1`].
     ///
     /// # Errors
@@ -168,9 +162,9 @@ impl Moments {
         mesh: &Mesh,
         load: [&dyn Field; 2],
         tension: [&dyn Field; 2],
-        force: Option<&[f64]>,
+        near: Option<Near<'_>>,
     ) -> Result<(), FieldError> {
-        let missing = self.missing(mesh, force);
+        let missing = self.missing(mesh, tension, near);
         if missing.is_empty() {
             return Ok(());
         }
@@ -178,31 +172,53 @@ impl Moments {
         for &t in &missing {
             new[t] = true;
         }
-        self.complete |= force.is_none();
+        self.complete |= near.is_none();
         self.sample(mesh, load, tension, |t| new[t])
     }
 
-    /// The elements that were not sampled and touch a vertex with a force, or one on the boundary that such a vertex may lend its share to; without forces
-    /// all that were not sampled.
-    pub(super) fn missing(&self, mesh: &Mesh, force: Option<&[f64]>) -> Vec<usize> {
+    /// The elements that were not sampled, touch a vertex with a force (or one on the boundary that such a vertex may lend its share to) and have no affine
+    /// action; without forces all that were not sampled.
+    pub(super) fn missing(
+        &self,
+        mesh: &Mesh,
+        tension: [&dyn Field; 2],
+        near: Option<Near<'_>>,
+    ) -> Vec<usize> {
         let Integrals::Each(place, _) = &self.products else {
             return Vec::new();
         };
         if self.complete {
             return Vec::new();
         }
-        let boundary = mesh.boundary();
-        let pressed = |j: usize| !boundary[j] && force.is_none_or(|force| force[j] > 0.0);
+        let unseen = |t: usize| place[t] == NOWHERE;
+        let Some(Near { force, loads }) = near else {
+            return (0..mesh.triangle_count()).filter(|&t| unseen(t)).collect();
+        };
+        let (triangles, boundary) = (mesh.triangles(), mesh.boundary());
+        let pressed = |j: usize| force[j] > 0.0 && !boundary[j];
         // Shares go along the boundary as far as there are gaps to close: all of it may be reached.
-        let any = mesh.triangles().iter().any(|v| {
+        let any = triangles.iter().any(|v| {
             let v = v.map(|j| j.index());
-            v.iter().any(|&j| pressed(j)) && v.iter().any(|&j| boundary[j])
+            v.iter().any(|&j| boundary[j]) && v.iter().any(|&j| pressed(j))
         });
-        let matters = |j: usize| pressed(j) || ((any || force.is_none()) && boundary[j]);
-        let triangles = mesh.triangles().iter().enumerate();
+        let matters = |j: usize| pressed(j) || (any && boundary[j]);
+        let constant = tension.map(|f| f.constant());
+        let known = |t: usize| {
+            let [Some(m1), Some(m2)] = constant else {
+                return false;
+            };
+            let area = mesh.area(TriangleId(t as u32));
+            let [f, g] = loads.each_ref().map(|f| f.moments(t, area));
+            let hats = [0, 1, 2].map(|k| Pair([f[k], g[k]]));
+            let deviation = Pair(loads.each_ref().map(|f| f.deviation_squared(t)));
+            affine_action([m1, m2], area, &hats, deviation).is_some()
+        };
         triangles
-            .filter(|(t, v)| place[*t] == NOWHERE && v.iter().any(|j| matters(j.index())))
+            .iter()
+            .enumerate()
+            .filter(|(_, v)| v.iter().any(|j| matters(j.index())))
             .map(|(t, _)| t)
+            .filter(|&t| unseen(t) && !known(t))
             .collect()
     }
 
@@ -296,22 +312,30 @@ impl Moments {
         }
     }
 
+    /// lambda* where it is the same everywhere, known by the constants that it is made from.
+    #[inline]
+    pub(super) fn constant_action(&self) -> Option<f64> {
+        match &self.products {
+            Integrals::Constant(value) => Some(*value),
+            Integrals::Each(..) => None,
+        }
+    }
+
+    /// lambda* in an element as it was sampled.
+    #[inline]
+    pub(super) fn action(&self, t: usize) -> Action<'_> {
+        match &self.products {
+            Integrals::Constant(value) => Action::Affine([*value; 3]),
+            Integrals::Each(place, products) => products
+                .get(place[t] as usize)
+                .map_or(Action::Unknown, |p| Action::Sampled(&p[ACTION])),
+        }
+    }
+
     /// (lambda*, phi_k phi_l) over element `t` of this area.
     #[inline]
     pub fn action_product(&self, t: usize, area: f64, k: usize, l: usize) -> f64 {
         self.product(ACTION, t, area, k, l)
-    }
-
-    /// (lambda*, phi_k) over element `t` of this area.
-    #[inline]
-    pub fn action_hat(&self, t: usize, area: f64, k: usize) -> f64 {
-        match &self.products {
-            Integrals::Constant(value) => value * area / 3.0,
-            Integrals::Each(place, products) => products.get(place[t] as usize).map_or(0.0, |p| {
-                let p = &p[ACTION];
-                p[product(k, 0)] + p[product(k, 1)] + p[product(k, 2)]
-            }),
-        }
     }
 
     /// (f_i, phi_k phi_l) over a sampled element; from `mean` where all data are constants.

@@ -20,8 +20,9 @@ use fem_core::quadrature::POINTS;
 
 use super::Given;
 use super::fan::{Corner, Fan, beginnings};
-use super::misfit::{CornerFrame, Frame, Reconstruction, pairs};
+use super::frame::{CornerFrame, Frame, pairs};
 use super::moments::Values;
+use super::reconstruction::Reconstruction;
 use super::ring::Ring;
 use super::shares::{SIGN, Shares};
 
@@ -267,9 +268,9 @@ impl Link {
         let area = frame.products.area;
         // (chi_Dj, phi) for the vertex itself and the two other corners.
         let cell = [11.0 * area / 54.0, 7.0 * area / 108.0, 7.0 * area / 108.0];
-        let theta = shares.theta[j];
+        let theta = shares[j].theta;
         let moments = [0, 1].map(|i| {
-            let own = shares.cell(i, j);
+            let own = shares[j].cell.0[i];
             let mean = given.loads[i].mean(t);
             let mut result = [0.0; 3];
             for l in 0..3 {
@@ -364,7 +365,7 @@ impl Reconstruction for Fluxes<'_> {
         shares: &Shares,
     ) -> f64 {
         let v = self.mesh.triangles()[triangle];
-        UNIFORM * area * pairs(v.map(|j| shares.cell(membrane, j.index())))
+        UNIFORM * area * pairs(v.map(|j| shares[j.index()].cell.0[membrane]))
     }
 
     fn lacks_cells(&self) -> bool {

@@ -3,112 +3,236 @@
 //! Every vertex gives its force z_j to the two parts: as much as it can to lambda*, the exact action inside contact, and the rest to its dual
 //! cell. That is nonnegative, and cancels against the loads before anything is divided by a soft tension.
 
+use std::ops::{Add, Index, Range};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
 use fem_core::Mesh;
+use fem_core::parallel::{self, BLOCK};
 
 use super::Given;
+use super::data::Data;
+use super::element::{Geometry, Pair};
 use crate::action::extend_to_boundary;
 
 /// A remainder below this part of the force is rounding.
 const REMAINDER: f64 = 1e-13;
 
+/// What a vertex has.
+#[derive(Clone, Copy, Default, Debug)]
+pub(super) struct Share {
+    /// Share of lambda*, in [0, 1].
+    pub theta: f64,
+    /// Action of the dual cell, not negative.
+    pub kappa: f64,
+    /// What the dual cell adds to the divergence of the fluxes: +-kappa_j - r_i, where r_i is the residual rho_ij of the rows over |D_j|, 0 on the boundary.
+    pub cell: Pair,
+    /// |D_j|.
+    pub area: f64,
+}
+
+impl Share {
+    /// Gives a dual cell on the boundary its action.
+    fn press(&mut self, kappa: f64) {
+        self.kappa = kappa;
+        self.cell = Pair(SIGN) * kappa;
+    }
+
+    /// Whether the vertex has an action.
+    #[inline(always)]
+    pub fn presses(&self) -> bool {
+        self.theta != 0.0 || self.kappa != 0.0
+    }
+}
+
 /// One entry a vertex.
 pub(super) struct Shares {
-    /// Shares of lambda*, in [0, 1].
-    pub theta: Vec<f64>,
-    /// Actions of the dual cells, not negative.
-    pub kappa: Vec<f64>,
-    /// r_i on the dual cells: the residual rho_ij of the rows over |D_j|; 0 on the boundary.
-    pub residual: [Vec<f64>; 2],
-    /// |D_j|.
-    pub area: Vec<f64>,
+    each: Vec<Share>,
+    /// (sum_i mu_i,min^-1 sum_j rho_ij^2/|D_j|)^(1/2) d/pi, see [`super`].
+    pub algebraic: f64,
+}
+
+impl Index<usize> for Shares {
+    type Output = Share;
+
+    #[inline(always)]
+    fn index(&self, vertex: usize) -> &Share {
+        &self.each[vertex]
+    }
+}
+
+/// Sums at a vertex: |D_j|, (lambda*, phi_j), and (f_i, phi_j) - (mu_i grad u_ih, grad phi_j) for both membranes.
+type Sums = [f64; 4];
+
+/// Sums at all vertices that several threads add to, each to vertices that no other touches.
+struct Table(Vec<[AtomicU64; 4]>);
+
+impl Table {
+    fn new(count: usize) -> Table {
+        Table((0..count).map(|_| Default::default()).collect())
+    }
+
+    #[inline(always)]
+    fn add(&self, j: usize, values: Sums) {
+        for (sum, value) in self.0[j].iter().zip(values) {
+            sum.store(
+                (f64::from_bits(sum.load(Relaxed)) + value).to_bits(),
+                Relaxed,
+            );
+        }
+    }
+
+    fn at(&self, j: usize) -> Sums {
+        self.0[j]
+            .each_ref()
+            .map(|sum| f64::from_bits(sum.load(Relaxed)))
+    }
+}
+
+/// Which vertices belong to triangles of several blocks.
+fn shared(mesh: &Mesh) -> Vec<bool> {
+    const NONE: u32 = u32::MAX;
+    let count = mesh.vertex_count();
+    let (mut owner, mut shared) = (vec![NONE; count], vec![false; count]);
+    for (number, block) in parallel::blocks(mesh.triangle_count()).enumerate() {
+        for j in mesh.triangles()[block]
+            .as_flattened()
+            .iter()
+            .map(|j| j.index())
+        {
+            shared[j] |= owner[j] != NONE && owner[j] != number as u32;
+            owner[j] = number as u32;
+        }
+    }
+    shared
 }
 
 impl Shares {
-    /// Divides the forces and evaluates the residuals; O(N). Returns the fluxes mu_iK grad u_ih of every element too.
-    pub fn of(given: &Given<'_>) -> (Shares, Vec<[[f64; 2]; 2]>) {
-        let (mesh, moments) = (given.mesh, given.moments);
+    /// Divides the forces and evaluates the residuals; O(N).
+    pub fn of<D: Data>(given: &Given<'_>, data: &D) -> Shares {
+        let mesh = given.mesh;
         let count = mesh.vertex_count();
-        let mut area = vec![0.0; count];
-        let mut flux = Vec::with_capacity(mesh.triangle_count());
-        let boundary = mesh.boundary();
-        // (lambda*, phi_j) and (f_i, phi_j) - (mu_i grad u_ih, grad phi_j).
-        let mut action = vec![0.0; count];
-        let mut rows = [vec![0.0; count], vec![0.0; count]];
-        for (t, id) in mesh.triangle_ids().enumerate() {
-            let shape = mesh.shape(id);
-            let vertices = mesh.triangles()[t];
-            let own = [0, 1].map(|i| {
-                let g = shape.gradient(vertices.map(|v| given.displacement[i][v.index()]));
-                let mu = given.tension_mean[i][t];
-                [mu * g[0], mu * g[1]]
-            });
-            flux.push(own);
-            let hats = given.loads.each_ref().map(|f| f.moments(t, shape.area));
-            for (k, v) in vertices.iter().enumerate() {
-                let j = v.index();
-                area[j] += shape.area / 3.0;
-                action[j] += moments.action_hat(t, shape.area, k);
-                let g = shape.gradients[k];
-                for i in 0..2 {
-                    let q = own[i];
-                    rows[i][j] += hats[i][k] - shape.area * (q[0] * g[0] + q[1] * g[1]);
-                }
-            }
-        }
-        let mut theta = vec![0.0; count];
-        let mut kappa = vec![0.0; count];
-        for j in (0..count).filter(|&j| !boundary[j]) {
-            let force = given.force[j].max(0.0);
-            if force > 0.0 {
-                if action[j] > 0.0 {
-                    theta[j] = (force / action[j]).min(1.0);
-                }
-                let rest = force - theta[j] * action[j];
-                if rest > REMAINDER * force {
-                    kappa[j] = rest / area[j];
-                }
-            }
-            // What the two parts carry together, so that the fluxes close to rounding.
-            let carried = theta[j] * action[j] + kappa[j] * area[j];
-            for (i, sign) in [(0, 1.0), (1, -1.0)] {
-                rows[i][j] = (rows[i][j] + sign * carried) / area[j];
-            }
-        }
-        for row in &mut rows {
-            for j in (0..count).filter(|&j| boundary[j]) {
-                row[j] = 0.0;
-            }
-        }
-        extend_to_boundary(mesh, |j| given.gap(j), &mut theta);
-        extend_to_boundary(mesh, |j| given.gap(j), &mut kappa);
-        let shares = Shares {
-            theta,
-            kappa,
-            residual: rows,
-            area,
+        let threads = parallel::worthwhile(given.threads, mesh.triangle_count());
+        let sums = Table::new(count);
+        // What goes to a vertex of several blocks is put off, so that it is added in the order of the triangles too.
+        let shared = if threads > 1 {
+            shared(mesh)
+        } else {
+            Vec::new()
         };
-        (shares, flux)
+        let late = parallel::map(
+            threads,
+            parallel::blocks(mesh.triangle_count()).collect(),
+            |block| {
+                let mut late = Vec::new();
+                let touches = contributions(given, data, block, |j, values| {
+                    if shared.get(j).is_some_and(|&shared| shared) {
+                        late.push((j, values));
+                    } else {
+                        sums.add(j, values);
+                    }
+                });
+                (late, touches)
+            },
+        );
+        let mut touches = false;
+        for (late, block) in late {
+            touches |= block;
+            late.into_iter().for_each(|(j, values)| sums.add(j, values));
+        }
+        let mut each = vec![Share::default(); count];
+        let (force, boundary) = (given.force, mesh.boundary());
+        let jobs = each.chunks_mut(BLOCK).enumerate().collect();
+        let squares = parallel::map(threads, jobs, |(number, chunk)| {
+            let mut squares = Pair::default();
+            for (j, share) in (number * BLOCK..).zip(chunk) {
+                let residual;
+                (*share, residual) = divided(sums.at(j), force[j], boundary[j]);
+                squares += residual * residual * share.area;
+            }
+            squares
+        });
+        if touches {
+            extend(
+                given,
+                &mut each,
+                |share| share.theta,
+                |share, theta| share.theta = theta,
+            );
+            extend(given, &mut each, |share| share.kappa, Share::press);
+        }
+        let squares = squares.into_iter().fold(Pair::default(), Pair::add);
+        let [first, second] = [0, 1].map(|i| squares.0[i] / given.moments.stiffness_low[i].least());
+        Shares {
+            each,
+            algebraic: width(mesh) / std::f64::consts::PI * (first + second).sqrt(),
+        }
     }
+}
 
-    /// What the dual cell of `j` adds to the divergence of the flux of membrane `i`: +-kappa_j - rho_ij/|D_j|.
-    #[inline]
-    pub fn cell(&self, i: usize, j: usize) -> f64 {
-        SIGN[i] * self.kappa[j] - self.residual[i][j]
+/// Shows what the triangles of a block add to the sums of their vertices, in order; whether an action may reach the boundary there.
+#[inline(always)]
+fn contributions<D: Data>(
+    given: &Given<'_>,
+    data: &D,
+    block: Range<usize>,
+    mut add: impl FnMut(usize, Sums),
+) -> bool {
+    let mesh = given.mesh;
+    let (points, boundary) = (mesh.points(), mesh.boundary());
+    let triangles = &mesh.triangles()[block.clone()];
+    let ([upper, lower], force) = (given.displacement, given.force);
+    let mut touches = false;
+    for (t, v) in block.zip(triangles) {
+        let v = v.map(|j| j.index());
+        let shape = Geometry::of(v.map(|j| points[j]));
+        let rows = shape.rows(data.tension(t), v.map(|j| Pair([upper[j], lower[j]])));
+        let hats = data.hats(t, shape.area);
+        let mut action = [0.0; 3];
+        if v.iter().any(|&j| force[j] > 0.0) {
+            action = data.action(t, shape.area, &hats).hats(shape.area);
+            touches |= v.iter().any(|&j| boundary[j]);
+        }
+        for k in 0..3 {
+            let Pair([f, g]) = hats[k] - rows[k];
+            add(v[k], [shape.area / 3.0, action[k], f, g]);
+        }
     }
+    touches
+}
 
-    /// (sum_i mu_i,min^-1 sum_j rho_ij^2/|D_j|)^(1/2) d/pi, see [`super`]; `low` are lower bounds of the tensions.
-    pub fn algebraic(&self, mesh: &Mesh, low: [f64; 2]) -> f64 {
-        let squares: f64 = (0..2)
-            .map(|i| {
-                let sum: f64 = self.residual[i]
-                    .iter()
-                    .zip(&self.area)
-                    .map(|(r, area)| r * r * area)
-                    .sum();
-                sum / low[i]
-            })
-            .sum();
-        width(mesh) / std::f64::consts::PI * squares.sqrt()
+/// What a vertex makes of its force, and the residuals r_i.
+fn divided([area, action, f, g]: Sums, force: f64, boundary: bool) -> (Share, Pair) {
+    let mut share = Share {
+        area,
+        ..Share::default()
+    };
+    if boundary {
+        return (share, Pair::default());
+    }
+    let force = force.max(0.0);
+    if force > 0.0 {
+        if action > 0.0 {
+            share.theta = (force / action).min(1.0);
+        }
+        let rest = force - share.theta * action;
+        if rest > REMAINDER * force {
+            share.kappa = rest / area;
+        }
+    }
+    // What the two parts carry together, so that the fluxes close to rounding.
+    let carried = share.theta * action + share.kappa * area;
+    let residual = Pair([f + carried, g - carried]) * (1.0 / area);
+    share.cell = Pair(SIGN) * share.kappa - residual;
+    (share, residual)
+}
+
+/// Gives the boundary vertices their values, which have none yet.
+fn extend(given: &Given<'_>, each: &mut [Share], get: fn(&Share) -> f64, set: fn(&mut Share, f64)) {
+    let mut values: Vec<f64> = each.iter().map(get).collect();
+    extend_to_boundary(given.mesh, |j| given.gap(j), &mut values);
+    let boundary = given.mesh.boundary();
+    for ((share, value), _) in each.iter_mut().zip(values).zip(boundary).filter(|b| *b.1) {
+        set(share, value);
     }
 }
 

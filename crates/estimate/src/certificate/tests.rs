@@ -2,9 +2,10 @@
 
 use fem_core::integrate::load_pair;
 use fem_core::quadrature::{POINTS, rule};
-use fem_core::{Children, Constant, ElementValues, Field, Mesh, TriangleId};
+use fem_core::{Children, Constant, ElementValues, Field, Mesh, TriangleId, parallel};
 
-use super::misfit::Reconstruction;
+use super::data::General;
+use super::reconstruction::Reconstruction;
 use super::shares::Shares;
 use super::{Given, Grade, Moments, POINCARE, certify, rt0, rt1};
 use crate::testing::{close, four_triangles};
@@ -23,6 +24,11 @@ fn case() -> Case {
         .expect("refines");
     mesh.refine(&[TriangleId(1), TriangleId(2)], Children::Four)
         .expect("refines");
+    on(mesh, 1.0)
+}
+
+/// The pair on a mesh, with forces times `factor`.
+fn on(mesh: Mesh, factor: f64) -> Case {
     let value = |f: fn(f64, f64) -> f64| -> Vec<f64> {
         mesh.points().iter().map(|p| f(p[0], p[1])).collect()
     };
@@ -30,7 +36,7 @@ fn case() -> Case {
         .points()
         .iter()
         .zip(mesh.boundary())
-        .map(|(p, &b)| if b { 0.0 } else { 0.3 + 0.2 * p[0] })
+        .map(|(p, &b)| if b { 0.0 } else { factor * (0.3 + 0.2 * p[0]) })
         .collect();
     Case {
         displacement: [
@@ -55,7 +61,10 @@ const TENSION: [Constant; 2] = [Constant(2.0), Constant(0.5)];
 
 /// Calls `look` with everything that a reconstruction is made from.
 fn with(look: impl FnOnce(&Case, &Given<'_>, &Shares, &[[[f64; 2]; 2]])) {
-    let case = case();
+    with_case(case(), look);
+}
+
+fn with_case(case: Case, look: impl FnOnce(&Case, &Given<'_>, &Shares, &[[[f64; 2]; 2]])) {
     let load: [&dyn Field; 2] = [&first_load, &second_load];
     let tension: [&dyn Field; 2] = [&TENSION[0], &TENSION[1]];
     let moments = Moments::of(&case.mesh, load, tension).expect("finite");
@@ -69,8 +78,10 @@ fn with(look: impl FnOnce(&Case, &Given<'_>, &Shares, &[[[f64; 2]; 2]])) {
         tension_mean: &case.tension_mean,
         displacement: &case.displacement,
         force: &case.force,
+        threads: 1,
     };
-    let (shares, flux) = Shares::of(&given);
+    let shares = Shares::of(&given, &General(&given));
+    let flux = super::fluxes(&given);
     look(&case, &given, &shares, &flux);
 }
 
@@ -96,7 +107,12 @@ fn flux_at(
 }
 
 /// The normal components of s_i from both sides of every interior edge agree.
-fn is_continuous(case: &Case, fluxes: &dyn Reconstruction, gradient: &[[[f64; 2]; 2]]) {
+fn is_continuous(
+    case: &Case,
+    fluxes: &dyn Reconstruction,
+    gradient: &[[[f64; 2]; 2]],
+    tolerance: f64,
+) {
     let mut seen = 0.0f64;
     for edge in case.mesh.interior_edges() {
         let normal = case.mesh.shape(edge.triangles[0]).normal(edge.faces[0]);
@@ -115,7 +131,7 @@ fn is_continuous(case: &Case, fluxes: &dyn Reconstruction, gradient: &[[[f64; 2]
                 };
                 let (one, other) = (side(0), side(1));
                 seen = seen.max(one.abs());
-                assert!((one - other).abs() < 1e-13, "{one} {other}");
+                assert!((one - other).abs() < tolerance, "{one} {other}");
             }
         }
     }
@@ -125,10 +141,64 @@ fn is_continuous(case: &Case, fluxes: &dyn Reconstruction, gradient: &[[[f64; 2]
 #[test]
 fn fluxes_of_both_grades_are_continuous() {
     with(|case, given, shares, gradient| {
-        let (fluxes, _) = rt0::equilibrate(given, shares, gradient);
-        is_continuous(case, &fluxes, gradient);
+        let (fluxes, _) = rt0::equilibrate(given, &General(given), shares);
+        is_continuous(case, &fluxes, gradient, 1e-13);
         let (fluxes, _) = rt1::equilibrate(given, shares, gradient);
-        is_continuous(case, &fluxes, gradient);
+        is_continuous(case, &fluxes, gradient, 1e-13);
+    });
+}
+
+/// Blocks of triangles fit together, and neither they nor the sums at the vertices tell how many threads there are.
+#[test]
+fn fluxes_are_continuous_across_blocks_on_any_number_of_threads() {
+    let mut mesh = four_triangles();
+    // Blocks that end anywhere in the triangles of this mesh.
+    mesh.refine(&[TriangleId(1)], Children::Four)
+        .expect("refines");
+    while mesh.triangle_count() < 3 * parallel::BLOCK {
+        mesh.refine_uniformly(Children::Four).expect("refines");
+    }
+    let area = 4.0 / mesh.triangle_count() as f64;
+    with_case(on(mesh, 10.0 * area), |case, given, shares, gradient| {
+        let (fluxes, squares) = rt0::equilibrate(given, &General(given), shares);
+        is_continuous(case, &fluxes, gradient, 1e-11);
+        let one = certify(given, Grade::Rt0, POINCARE).expect("finite");
+        assert!(one.contact > 0.0);
+        for threads in [2, 3] {
+            let given = &Given { threads, ..*given };
+            let (_, more) = rt0::equilibrate(given, &General(given), shares);
+            assert_eq!(more, squares, "{threads} threads");
+            let more = certify(given, Grade::Rt0, POINCARE).expect("finite");
+            assert_eq!(more, one, "{threads} threads");
+        }
+    });
+}
+
+/// What has closed forms is bounded at least as high as by samples of every element, and hardly higher.
+#[test]
+fn closed_bounds_are_as_sharp_as_samples() {
+    let mut mesh = four_triangles();
+    for _ in 0..4 {
+        mesh.refine_uniformly(Children::Four).expect("refines");
+    }
+    let area = 4.0 / mesh.triangle_count() as f64;
+    with_case(on(mesh, 10.0 * area), |_, given, shares, gradient| {
+        let fast = certify(given, Grade::Rt0, POINCARE).expect("finite");
+        let (fluxes, squares) = rt0::equilibrate(given, &General(given), shares);
+        let sampled = super::summed(
+            given,
+            Grade::Rt0,
+            POINCARE,
+            shares,
+            gradient,
+            &squares,
+            &fluxes,
+        )
+        .expect("finite");
+        let quotient = fast.eta / sampled.eta;
+        assert!((0.999..1.0025).contains(&quotient), "{quotient}");
+        close(fast.contact, sampled.contact, 1e-3);
+        close(fast.algebraic, sampled.algebraic, 1e-3);
     });
 }
 
@@ -159,7 +229,7 @@ fn by_quadrature(mesh: &Mesh, fluxes: &dyn Reconstruction, t: usize, i: usize) -
 #[test]
 fn closed_norms_are_those_of_the_fields() {
     with(|case, given, shares, gradient| {
-        let (coarse, coarse_squares) = rt0::equilibrate(given, shares, gradient);
+        let (coarse, coarse_squares) = rt0::equilibrate(given, &General(given), shares);
         let (fine, fine_squares) = rt1::equilibrate(given, shares, gradient);
         for t in 0..case.mesh.triangle_count() {
             for i in 0..2 {
@@ -182,7 +252,7 @@ fn closed_norms_are_those_of_the_fields() {
 #[test]
 fn fluxes_balance_every_element() {
     with(|case, given, shares, gradient| {
-        let (coarse, _) = rt0::equilibrate(given, shares, gradient);
+        let (coarse, _) = rt0::equilibrate(given, &General(given), shares);
         let (fine, _) = rt1::equilibrate(given, shares, gradient);
         for grade in [&coarse as &dyn Reconstruction, &fine] {
             for t in 0..case.mesh.triangle_count() {
@@ -208,8 +278,8 @@ fn fluxes_balance_every_element() {
                     let hats = given.loads[i].moments(t, shape.area);
                     for (k, &j) in v.iter().enumerate() {
                         wanted += hats[k]
-                            + sign * shares.theta[j] * given.moments.action_hat(t, shape.area, k)
-                            + shares.cell(i, j) * shape.area / 3.0;
+                            + sign * shares[j].theta * given.moments.action(t).hats(shape.area)[k]
+                            + shares[j].cell.0[i] * shape.area / 3.0;
                     }
                     assert!((outward - wanted).abs() < 1e-13, "{outward} {wanted}");
                 }
@@ -227,16 +297,16 @@ fn shares_add_to_the_forces() {
         for (t, v) in mesh.triangles().iter().enumerate() {
             let area = mesh.shape(TriangleId(t as u32)).area;
             for (k, v) in v.iter().enumerate() {
-                action[v.index()] += given.moments.action_hat(t, area, k);
+                action[v.index()] += given.moments.action(t).hats(area)[k];
             }
         }
         let mut parts = [0, 0];
         for j in (0..mesh.vertex_count()).filter(|&j| !mesh.boundary()[j]) {
-            let sum = shares.theta[j] * action[j] + shares.kappa[j] * shares.area[j];
+            let sum = shares[j].theta * action[j] + shares[j].kappa * shares[j].area;
             close(sum, case.force[j], 1e-13);
-            assert!((0.0..=1.0).contains(&shares.theta[j]) && shares.kappa[j] >= 0.0);
-            parts[0] += usize::from(shares.theta[j] > 0.0);
-            parts[1] += usize::from(shares.kappa[j] > 0.0);
+            assert!((0.0..=1.0).contains(&shares[j].theta) && shares[j].kappa >= 0.0);
+            parts[0] += usize::from(shares[j].theta > 0.0);
+            parts[1] += usize::from(shares[j].kappa > 0.0);
         }
         assert!(parts[0] > 0 && parts[1] > 0, "{parts:?}");
     });
@@ -268,6 +338,7 @@ fn an_exact_pair_is_certified_to_rounding() {
         tension_mean: &case.tension_mean,
         displacement: &displacement,
         force: &force,
+        threads: 1,
     };
     for grade in [Grade::Rt0, Grade::Rt1] {
         let found = certify(&given, grade, POINCARE).expect("finite");
