@@ -10,32 +10,11 @@ for every vertex. Python's standard library only.
 """
 
 import argparse
-import csv
-import pathlib
-import resource
-import subprocess
-import sys
 import tempfile
-import time
 
 from study import HERE, Program
 
 CERTIFIED = ['estimate.estimator="certified"', 'estimate.final="fast"', "stop={}", "stop.relative_error=0.005"]
-
-
-def timed(program, folder, scene, keys, threads):
-    """Wall seconds, processor seconds and the last row of the history."""
-    out = pathlib.Path(folder) / "out"
-    command = [program, "run", str(scene), "--out", str(out), "--force", "--quiet", "--threads", str(threads)]
-    command += [word for key in keys for word in ("--set", key)]
-    before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    done = subprocess.run(command, stdout=subprocess.DEVNULL)
-    wall, after = time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(map(str, command))}: exit code {done.returncode}")
-    with open(out / "history.csv", encoding="utf-8", newline="") as file:
-        row = list(csv.DictReader(file))[-1]
-    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, row
 
 
 def main():
@@ -45,20 +24,20 @@ def main():
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         exact = HERE / "study" / "P2.toml"
-        plain = Program(arguments.program, folder).plain("P2")
-        run = lambda scene, keys, threads=1: timed(arguments.program, folder, scene, keys, threads)
-        vertices = int(run(plain, CERTIFIED)[2]["vertices"])
+        program = Program(arguments.program, folder)
+        plain = program.plain("P2")
+        vertices = int(program.measure(plain, CERTIFIED)[2][-1]["vertices"])
         residual = ["stop={}", f"stop.vertices={vertices}"]
-        error = {name: float(run(exact, keys)[2]["true_error"]) for name, keys in (("certified", CERTIFIED), ("residual", residual))}
+        error = {name: float(program.measure(exact, keys)[2][-1]["true_error"]) for name, keys in (("certified", CERTIFIED), ("residual", residual))}
         print("| threads | run | vertices | bound | true error | wall s | processor s | times the other, to the same true error |")
         print("|---|---|---|---|---|---|---|---|")
         for threads in (1, 2):
             best = {}
             for _ in range(arguments.repeat):
                 for name, keys in (("certified", CERTIFIED), ("residual", residual)):
-                    wall, processor, row = run(plain, keys, threads)
-                    old = best.get(name, (wall, processor, row))
-                    best[name] = (min(wall, old[0]), min(processor, old[1]), row)
+                    wall, processor, history = program.measure(plain, keys, threads)
+                    old = best.get(name, (wall, processor))
+                    best[name] = (min(wall, old[0]), min(processor, old[1]), history[-1])
             for name, (wall, processor, row) in best.items():
                 other = best["residual" if name == "certified" else "certified"]
                 times = ""

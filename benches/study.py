@@ -20,6 +20,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+import time
 
 HERE = pathlib.Path(__file__).resolve().parent
 COST = HERE.parent / "docs" / "cost.md"
@@ -47,22 +48,24 @@ class Program:
         path.write_text(text[:start] + text[end:], encoding="utf-8")
         return path
 
-    def run(self, scene, children, theta, rule):
-        """Runs until the rule holds; processor seconds and the history."""
+    def measure(self, scene, keys, threads=1):
+        """One run with the keys `keys`; wall seconds, processor seconds and the history."""
         out = self.folder / "out"
-        sets = ["stop={}", rule, f"mark.children={children}", f"mark.theta={theta}"]
-        command = [self.path, "run", str(scene), "--out", str(out), "--force", "--quiet", "--threads", "1"]
-        for s in sets:
-            command += ["--set", s]
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = [self.path, "run", str(scene), "--out", str(out), "--force", "--quiet", "--threads", str(threads)]
+        command += [word for key in keys for word in ("--set", key)]
+        before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
         done = subprocess.run(command, stdout=subprocess.DEVNULL)
+        wall, after = time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
         # A goal was reached, or a limit.
         if done.returncode != 0:
             sys.exit(f"{' '.join(map(str, command))}: exit code {done.returncode}")
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
         seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         with open(out / "history.csv", encoding="utf-8", newline="") as file:
-            return seconds, list(csv.DictReader(file))
+            return wall, seconds, list(csv.DictReader(file))
+
+    def run(self, scene, children, theta, rule):
+        """Runs until the rule holds; processor seconds and the history."""
+        return self.measure(scene, ["stop={}", rule, f"mark.children={children}", f"mark.theta={theta}"])[1:]
 
 
 def known(program, scene, children, theta, least):

@@ -301,17 +301,18 @@ def main():
     best, before = {}, None
     for round_ in range(options.repeat):
         own = lambda: ours.run(ours.scene, levels[-1]["vertices"])[1] | {"levels": levels}
+        beside = lambda: min(own()["cpu"] for _ in range(BESIDE))
         coarser = fastest(lambda: ours.run(ours.scene, levels[-2]["vertices"])[1])
         before = min(before or coarser["cpu"], coarser["cpu"])
         runs = [("membranes", own)]
         runs += [(" ".join(p["command"][-3:]), lambda p=p: run_peer(p, options.target)) for p in here]
         for index, (name, run) in enumerate(runs):
             try:
-                pace = min(own()["cpu"] for _ in range(BESIDE))
+                # Nothing is to be measured beside ours itself.
+                before_it = beside() if index > 0 else None
                 result = fastest(run)
-                if index > 0:
-                    pace = 0.5 * (pace + min(own()["cpu"] for _ in range(BESIDE)))
-                    result["beside"] = pace
+                if before_it:
+                    result["beside"] = 0.5 * (before_it + beside())
             except RuntimeError as error:  # too little memory, say: the others go on
                 print(f"round {round_ + 1}: {error}", flush=True)
                 continue

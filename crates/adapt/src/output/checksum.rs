@@ -81,21 +81,26 @@ impl Beside<'_, '_, '_> {
         next.clear();
         let block = std::mem::replace(&mut self.block, next);
         let sent = other.full.send(block);
-        sent.map_err(|_| io::Error::other("the checksum was given up"))
+        sent.map_err(|_| given_up())
     }
 
     fn finish(mut self) -> io::Result<String> {
-        if self.other.is_none() {
-            return Ok(checksum(&self.block));
+        if self.other.is_some() {
+            self.pass_on()?;
         }
-        self.pass_on()?;
-        let Some(Other { full, sum, .. }) = self.other else {
-            return Ok(checksum(&self.block));
-        };
-        drop(full);
-        let given_up = |_| io::Error::other("the checksum was given up");
-        sum.join().map_err(given_up)
+        match self.other {
+            None => Ok(checksum(&self.block)),
+            Some(Other { full, sum, .. }) => {
+                drop(full);
+                sum.join().map_err(|_| given_up())
+            }
+        }
     }
+}
+
+/// The other thread ended before its time.
+fn given_up() -> io::Error {
+    io::Error::other("the checksum was given up")
 }
 
 impl Write for Beside<'_, '_, '_> {

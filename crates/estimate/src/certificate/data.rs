@@ -15,8 +15,11 @@ pub(super) trait Data: Sync {
     /// mu_iK.
     fn tension(&self, t: usize) -> Pair;
 
-    /// The means of 1/mu_i, but for a factor that may be chosen for every membrane.
-    fn weight(&self, t: usize) -> Pair;
+    /// The means of 1/mu_i, but for a factor that may be chosen for every membrane: nothing but the factor where tensions are constants.
+    #[inline(always)]
+    fn weight(&self, _t: usize) -> Pair {
+        Pair([1.0; 2])
+    }
 
     /// (f_i, phi_k) for the three corners of a triangle with this area.
     fn hats(&self, t: usize, area: f64) -> [Pair; 3];
@@ -86,11 +89,6 @@ impl Data for Plain {
     }
 
     #[inline(always)]
-    fn weight(&self, _: usize) -> Pair {
-        Pair([1.0; 2])
-    }
-
-    #[inline(always)]
     fn hats(&self, _: usize, area: f64) -> [Pair; 3] {
         [Pair(self.loads) * (area / 3.0); 3]
     }
@@ -108,9 +106,15 @@ impl Data for Plain {
 
 /// The moments of two loads by corners.
 #[inline(always)]
-fn hats(loads: &[Loads; 2], t: usize, area: f64) -> [Pair; 3] {
+pub(super) fn hats(loads: &[Loads; 2], t: usize, area: f64) -> [Pair; 3] {
     let [f, g] = loads.each_ref().map(|f| f.moments(t, area));
     [0, 1, 2].map(|k| Pair([f[k], g[k]]))
+}
+
+/// The squared deviations of two loads from their means.
+#[inline(always)]
+pub(super) fn deviation(loads: &[Loads; 2], t: usize) -> Pair {
+    Pair(loads.each_ref().map(|f| f.deviation_squared(t)))
 }
 
 impl Data for Loaded<'_> {
@@ -122,18 +126,13 @@ impl Data for Loaded<'_> {
     }
 
     #[inline(always)]
-    fn weight(&self, _: usize) -> Pair {
-        Pair([1.0; 2])
-    }
-
-    #[inline(always)]
     fn hats(&self, t: usize, area: f64) -> [Pair; 3] {
         hats(self.loads, t, area)
     }
 
     #[inline(always)]
     fn deviation(&self, t: usize) -> Pair {
-        Pair(self.loads.each_ref().map(|f| f.deviation_squared(t)))
+        deviation(self.loads, t)
     }
 
     #[inline]
@@ -168,7 +167,7 @@ impl Data for General<'_> {
 
     #[inline(always)]
     fn deviation(&self, t: usize) -> Pair {
-        Pair(self.0.loads.each_ref().map(|f| f.deviation_squared(t)))
+        deviation(self.0.loads, t)
     }
 
     #[inline(always)]

@@ -11,7 +11,7 @@ use fem_core::quadrature::affine_fit;
 use fem_core::{Field, FieldError, Mesh, Samples, TriangleId};
 
 use super::action::{Action, Products, affine_action, contact_action, product};
-use super::element::Pair;
+use super::data::{deviation, hats};
 
 /// Where the moments of an element are among those that are kept.
 #[derive(Clone, Debug)]
@@ -208,10 +208,7 @@ impl Moments {
                 return false;
             };
             let area = mesh.area(TriangleId(t as u32));
-            let [f, g] = loads.each_ref().map(|f| f.moments(t, area));
-            let hats = [0, 1, 2].map(|k| Pair([f[k], g[k]]));
-            let deviation = Pair(loads.each_ref().map(|f| f.deviation_squared(t)));
-            affine_action([m1, m2], area, &hats, deviation).is_some()
+            affine_action([m1, m2], area, &hats(loads, t, area), deviation(loads, t)).is_some()
         };
         triangles
             .iter()
